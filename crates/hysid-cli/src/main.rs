@@ -1,0 +1,3 @@
+//! The command line `hysid`: data on stdout, messages on stderr.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! From a simulation and a recording to a verdict: mismatch test, mechanisms, evidence, composition, experiment.

@@ -1,0 +1,1 @@
+//! Simulation files (`.sim.toml`): parse, compile, simulate, sensitivities, calibrate.

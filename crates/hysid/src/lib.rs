@@ -1,0 +1,1 @@
+//! The facade: recipes that identify a model from recordings and diagnose a simulation against one.
