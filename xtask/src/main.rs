@@ -2,8 +2,35 @@
 
 mod layers;
 
+use std::path::{Path, PathBuf};
+
+use clap::{Parser, Subcommand};
+
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", about = "Tasks of this repository", max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    task: Task,
+}
+
+/// One variant for each module beside this file.
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Check the house rules of `xtask/layers.toml`.
+    Layers,
+}
+
+/// The root of the workspace.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf)
+}
+
 fn main() -> anyhow::Result<()> {
-    let found = layers::breaches(std::path::Path::new("."))?;
-    anyhow::ensure!(found.is_empty(), "{}", found.join("\n"));
-    Ok(())
+    match Cli::parse().task {
+        Task::Layers => {
+            let found = layers::breaches(&root())?;
+            anyhow::ensure!(found.is_empty(), "{}", found.join("\n"));
+            Ok(())
+        }
+    }
 }

@@ -1,3 +1,26 @@
 //! The command line `hysid`: data on stdout, messages on stderr.
+//!
+//! Exit status 0 on success whatever the verdict, 2 for bad input (one message that names what is wrong), 1 for a failure
+//! of the program itself.
 
-fn main() {}
+mod commands;
+mod failure;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+#[derive(Debug, Parser)]
+#[command(name = "hysid", version, about = "Identify and diagnose systems with hysteresis", max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// One variant for each file in `commands/`.
+#[derive(Debug, Subcommand)]
+enum Command {}
+
+fn main() -> ExitCode {
+    match Cli::parse().command {}
+}
