@@ -1,1 +1,27 @@
 //! Hysteresis operators: an immutable model and a separate state for each, with the laws they obey as a conformance suite.
+//!
+//! An [`Operator`] maps an input sample to an output sample and keeps what it remembers in its own [`Operator::State`], so one
+//! model serves many runs, on any thread. Operators without time (relay, play, stop, Preisach, Prandtl-Ishlinskii, Maxwell
+//! slip) are operators as they stand. Operators given by a differential equation (Bouc-Wen, Dahl, LuGre, ...) implement
+//! [`Differential`] and become operators by [`Sampled`], which adds the sampling period and integrates by RK4.
+//!
+//! ```
+//! use hysid_hysteresis::{Operator, Play};
+//! let gear = Play::new(0.5)?;
+//! assert_eq!(gear.run(&[0.0, 1.0, 0.8, -1.0]), vec![0.0, 0.5, 0.5, -0.5]);
+//! # Ok::<(), hysid_hysteresis::ParameterError>(())
+//! ```
+
+mod differential;
+mod error;
+mod operator;
+mod play;
+mod relay;
+mod stop;
+
+pub use differential::{Differential, Sampled, SampledState, rk4};
+pub use error::ParameterError;
+pub use operator::{DynOperator, Operator, Running};
+pub use play::{Play, play};
+pub use relay::{Relay, RelayState, relay};
+pub use stop::Stop;
