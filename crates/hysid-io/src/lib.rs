@@ -1,1 +1,25 @@
 //! Files: recordings as CSV with errors that name file, line and column; versioned model files; write, then rename.
+//!
+//! * [`read_recording`] turns a CSV file into a [`hysid_signal::Recording`]; [`CsvChunks`] streams one that does not fit into memory.
+//! * [`require`] judges a recording against what a caller needs of it: a column that exists, that varies, that is long enough.
+//! * [`write_csv`], [`write_text`] and [`write_json`] put a file in place by a rename, so that no reader sees half of it.
+//! * [`read_versioned`] and [`write_versioned`] keep a `format_version` in every model file.
+//!
+//! Nothing here prints. In-memory types are not file formats: a crate that saves something converts it to a struct of its own.
+
+mod atomic;
+mod chunks;
+mod clock;
+mod error;
+mod json;
+mod read;
+pub mod require;
+mod write;
+
+pub use atomic::write_bytes;
+pub use chunks::{Chunk, CsvChunks};
+pub use clock::{ClockFit, fit_clock};
+pub use error::{InputError, InputProblem, WriteError};
+pub use json::{read_json, read_versioned, write_json, write_versioned};
+pub use read::{LARGEST_VALUE, ReadOptions, TimeSource, read_recording};
+pub use write::{format_number, write_csv, write_recording, write_text};

@@ -1,0 +1,51 @@
+//! What a caller may need of a recording, judged with one clear message: a column that exists, varies and is long enough.
+
+use std::path::Path;
+
+use hysid_signal::{Channel, Recording};
+
+use crate::error::{InputError, InputProblem};
+
+/// The channel of this name.
+///
+/// # Errors
+/// [`InputProblem::MissingColumn`], with the names that there are.
+pub fn channel<'a>(recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
+    recording.channel(name).ok_or_else(|| {
+        let has = recording.channels().iter().map(|c| format!("`{}`", c.name)).collect::<Vec<_>>().join(", ");
+        InputError::in_column(Path::new(recording.name()), name, InputProblem::MissingColumn(has))
+    })
+}
+
+/// The channel of this name, which must take at least two values.
+///
+/// # Errors
+/// As [`channel`]; [`InputProblem::AllMissing`]; [`InputProblem::Constant`].
+pub fn varying<'a>(recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
+    let found = channel(recording, name)?;
+    let mut present = found.samples.iter().copied().filter(|x| x.is_finite());
+    let file = Path::new(recording.name());
+    let Some(first) = present.next() else {
+        return Err(InputError::in_column(file, name, InputProblem::AllMissing));
+    };
+    if present.all(|x| x == first) {
+        return Err(InputError::in_column(file, name, InputProblem::Constant(first)));
+    }
+    Ok(found)
+}
+
+/// The number of samples at which none of the named channels is missing, which must be at least `needed`.
+///
+/// # Errors
+/// As [`channel`]; [`InputProblem::TooFewSamples`].
+pub fn samples(recording: &Recording, names: &[&str], needed: usize) -> Result<usize, InputError> {
+    for name in names {
+        channel(recording, name)?;
+    }
+    let found = recording.segments(names).iter().map(ExactSizeIterator::len).sum();
+    if found < needed {
+        let problem = InputProblem::TooFewSamples { found, needed };
+        return Err(InputError::whole(Path::new(recording.name()), problem));
+    }
+    Ok(found)
+}
