@@ -1,1 +1,17 @@
 //! Simulation files (`.sim.toml`): parse, compile, simulate, sensitivities, calibrate.
+//!
+//! [`Simulation`] is the document as the user wrote it, with its equations as [`Expr`] trees that can be rewritten and
+//! printed again. Nothing here knows a mechanism: what is missing in a simulation is found elsewhere, by rewriting one
+//! `Simulation` into another.
+
+mod dimension;
+mod document;
+mod error;
+mod expr;
+mod tape;
+mod unit;
+
+pub use document::{ClockSource, Hold, Initial, Input, Output, Parameter, Simulation, State, Time};
+pub use error::{Error, ErrorKind, Place};
+pub use expr::{BinaryOp, Expr, ExprError, Function, Memory, is_legal_symbol};
+pub use unit::{Unit, UnitError};

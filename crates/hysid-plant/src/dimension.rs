@@ -1,0 +1,146 @@
+//! Units of expressions: a clash is reported only where it is certain.
+//!
+//! A literal may carry a hidden unit (`9.81`), so it matches anything, and a product with one is unknown. Columns' names are
+//! not used: only the units that the file declares for parameters and states. Scales (`mm` against `m`) are not compared.
+
+use crate::document::Simulation;
+use crate::expr::{BinaryOp, Expr, Function, Memory};
+use crate::unit::Unit;
+
+/// The unit of an expression where the file settles it, or the clash.
+fn unit_of(simulation: &Simulation, expr: &Expr) -> Result<Option<Unit>, String> {
+    let unit = |e: &Expr| unit_of(simulation, e);
+    match expr {
+        Expr::Number(_) => Ok(None),
+        Expr::Symbol(name) if simulation.input(name).is_some() => Ok(None),
+        Expr::Symbol(name) => Ok(simulation.unit_of(name)),
+        Expr::Neg(a) => unit(a),
+        Expr::Binary(op, a, b) => {
+            let (left, right) = (unit(a)?, unit(b)?);
+            Ok(match (op, left, right) {
+                (BinaryOp::Add | BinaryOp::Sub, left, right) => same(expr, a, left, b, right)?,
+                (BinaryOp::Mul, Some(l), Some(r)) => Some(l.times(&r)),
+                (BinaryOp::Div, Some(l), Some(r)) => Some(l.per(&r)),
+                (BinaryOp::Pow, left, right) => {
+                    if let Some(r) = right.filter(|r| !r.is_dimensionless()) {
+                        return Err(format!("the exponent `{b}` has the unit {r}; an exponent is a pure number"));
+                    }
+                    match (left, &**b) {
+                        (Some(l), Expr::Number(n)) if n.fract() == 0.0 && n.abs() <= 12.0 => Some(l.power(*n as i32)),
+                        (Some(l), Expr::Number(n)) if *n == 0.5 => l.root(),
+                        (Some(l), _) if l.is_none() => Some(l),
+                        _ => None,
+                    }
+                }
+                _ => None,
+            })
+        }
+        Expr::Call(function, arguments) => {
+            let mut units = Vec::with_capacity(arguments.len());
+            for argument in arguments {
+                units.push(unit(argument)?);
+            }
+            let pure = |result: Option<Unit>| match (&units.first().cloned().flatten(), arguments.first()) {
+                (Some(u), Some(a)) if !u.is_dimensionless() => {
+                    Err(format!("`{}` takes a pure number, but `{a}` has the unit {u}", function.name()))
+                }
+                _ => Ok(result),
+            };
+            match function {
+                Function::Sin | Function::Cos | Function::Tan | Function::Sinh | Function::Cosh | Function::Tanh => {
+                    pure(Some(Unit::none()))
+                }
+                Function::Exp | Function::Asin | Function::Acos | Function::Atan => pure(Some(Unit::none())),
+                // A logarithm of a quantity is common in fitted laws: unknown, not wrong.
+                Function::Ln | Function::Log10 => Ok(None),
+                Function::Sqrt => Ok(units.first().cloned().flatten().and_then(|u| u.root())),
+                Function::Abs | Function::Floor => Ok(units.first().cloned().flatten()),
+                Function::Sign | Function::Step => Ok(Some(Unit::none())),
+                Function::Atan2 | Function::Min | Function::Max => match arguments.as_slice() {
+                    [a, b] => {
+                        let (left, right) = (units.first().cloned().flatten(), units.get(1).cloned().flatten());
+                        let common = same(expr, a, left, b, right)?;
+                        Ok(if *function == Function::Atan2 { Some(Unit::none()) } else { common })
+                    }
+                    _ => Ok(None),
+                },
+            }
+        }
+        Expr::Memory(memory, arguments) => {
+            let mut units = Vec::with_capacity(arguments.len());
+            for argument in arguments {
+                units.push((argument, unit(argument)?));
+            }
+            let Some(((first, first_unit), rest)) = units.split_first() else { return Ok(None) };
+            let seconds = Unit::parse("s").unwrap_or_default();
+            match memory {
+                Memory::Play | Memory::Relay => {
+                    for (argument, u) in rest {
+                        same(expr, first, first_unit.clone(), argument, u.clone())?;
+                    }
+                    Ok(if *memory == Memory::Play { first_unit.clone() } else { Some(Unit::none()) })
+                }
+                Memory::Delay | Memory::Lag => match rest {
+                    [(argument, Some(u))] if !u.same_dimension(&seconds) => {
+                        Err(format!("`{}` takes seconds, but `{argument}` has the unit {u}", memory.name()))
+                    }
+                    _ => Ok(first_unit.clone()),
+                },
+                Memory::Derivative => Ok(first_unit.as_ref().map(|u| u.per(&seconds))),
+            }
+        }
+    }
+}
+
+/// The common unit of two operands; the left one's name is kept where both are known.
+fn same(whole: &Expr, a: &Expr, left: Option<Unit>, b: &Expr, right: Option<Unit>) -> Result<Option<Unit>, String> {
+    match (left, right) {
+        (Some(l), Some(r)) if !l.same_dimension(&r) => {
+            Err(format!("`{a}` has the unit {l} and `{b}` the unit {r} in `{whole}`"))
+        }
+        // `x + 1`: the literal takes the other's unit; an input's unit is not declared, so nothing is known for certain.
+        (Some(l), _) => Ok(Some(l)),
+        (None, right) => Ok(right),
+    }
+}
+
+/// The first clash: its key and what clashes.
+pub(crate) fn first_clash(simulation: &Simulation) -> Option<(String, String)> {
+    for (key, expr) in simulation.expressions() {
+        let unit = match unit_of(simulation, expr) {
+            Ok(unit) => unit,
+            Err(message) => return Some((key, message)),
+        };
+        let Some(unit) = unit else { continue };
+        for state in &simulation.states {
+            let Some(own) = &state.unit else { continue };
+            let expected = if key == format!("states.{}.derivative", state.name) {
+                own.per(&Unit::parse("s").unwrap_or_default())
+            } else if key == format!("states.{}.initial", state.name) {
+                own.clone()
+            } else {
+                continue;
+            };
+            if !unit.same_dimension(&expected) {
+                return Some((key, format!("`{expr}` has the unit {unit}, but {expected} is needed")));
+            }
+        }
+    }
+    None
+}
+
+impl Simulation {
+    /// The unit of an expression over this simulation's symbols, where the declared units settle it; inputs count with the
+    /// unit that their column's name ends in.
+    pub fn unit_of_expr(&self, expr: &Expr) -> Option<Unit> {
+        let mut with_columns = self.clone();
+        // A parameter in the place of each input carries the unit of its column's name.
+        let inputs = std::mem::take(&mut with_columns.inputs);
+        for input in inputs {
+            let mut stand_in = crate::document::Parameter::new(&input.symbol, 0.0);
+            stand_in.unit = Unit::of_column(&input.column);
+            with_columns.parameters.push(stand_in);
+        }
+        unit_of(&with_columns, expr).ok().flatten()
+    }
+}

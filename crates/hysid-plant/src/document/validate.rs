@@ -1,0 +1,311 @@
+//! What a well-formed simulation is, beyond its syntax.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{ClockSource, Initial, Simulation};
+use crate::error::{Error, ErrorKind};
+use crate::expr::{Expr, Memory, is_identifier, is_reserved};
+
+/// A fault before its place in the text is known.
+pub(crate) struct Fault {
+    /// The key, `#key` appended where the key itself is at fault and not its value.
+    pub key: String,
+    /// The symbol at fault within an expression.
+    pub symbol: Option<String>,
+    /// Byte offset within an expression.
+    pub offset: Option<usize>,
+    /// What is wrong.
+    pub kind: ErrorKind,
+}
+
+fn fault(key: impl Into<String>, kind: ErrorKind) -> Fault {
+    Fault { key: key.into(), symbol: None, offset: None, kind }
+}
+
+fn fault_in(key: &str, symbol: &str, kind: ErrorKind) -> Fault {
+    Fault { key: key.to_owned(), symbol: Some(symbol.to_owned()), offset: None, kind }
+}
+
+impl Simulation {
+    /// Checks the document: names, bounds, symbols, initial values, units, outputs.
+    ///
+    /// # Errors
+    /// The first fault, without a file or place.
+    pub fn validate(&self) -> Result<(), Error> {
+        match self.first_fault() {
+            None => Ok(()),
+            Some(f) => {
+                Err(Error { file: None, place: None, key: f.key.trim_end_matches("#key").to_owned(), kind: f.kind })
+            }
+        }
+    }
+
+    pub(crate) fn first_fault(&self) -> Option<Fault> {
+        let checks = [
+            Self::fault_in_time,
+            Self::fault_in_names,
+            Self::fault_in_parameters,
+            Self::fault_in_symbols,
+            Self::fault_in_initial_values,
+            Self::fault_in_memory,
+            Self::fault_in_units,
+            Self::fault_in_outputs,
+        ];
+        checks.iter().find_map(|check| check(self))
+    }
+
+    fn fault_in_time(&self) -> Option<Fault> {
+        match &self.time.clock {
+            ClockSource::Period(period) if !(period.is_finite() && *period > 0.0) => {
+                let allowed = "a finite number above 0 is needed".to_owned();
+                Some(fault(
+                    "time.period_s",
+                    ErrorKind::BadNumber { what: "the sampling period", value: *period, allowed },
+                ))
+            }
+            ClockSource::Column(column) if column.is_empty() => {
+                Some(fault("time.column", ErrorKind::Missing("name of the time column")))
+            }
+            _ => None,
+        }
+    }
+
+    fn fault_in_names(&self) -> Option<Fault> {
+        let mut seen: BTreeMap<&str, String> = BTreeMap::new();
+        let inputs = self.inputs.iter().map(|i| ("inputs", &i.symbol, "an input"));
+        let parameters = self.parameters.iter().map(|p| ("parameters", &p.name, "a parameter"));
+        let states = self.states.iter().map(|s| ("states", &s.name, "a state"));
+        for (table, name, what) in inputs.chain(parameters).chain(states) {
+            let key = format!("{table}.{name}#key");
+            if is_reserved(name) {
+                return Some(fault(key, ErrorKind::Reserved(name.clone())));
+            }
+            if !is_identifier(name) {
+                return Some(fault(key, ErrorKind::BadSymbol(name.clone())));
+            }
+            if let Some(earlier) = seen.insert(name, what.to_owned()) {
+                return Some(fault(key, ErrorKind::Duplicate { name: name.clone(), earlier }));
+            }
+        }
+        let mut columns: BTreeMap<&str, String> = BTreeMap::new();
+        if let ClockSource::Column(column) = &self.time.clock {
+            columns.insert(column, "the time column".to_owned());
+        }
+        for input in &self.inputs {
+            let key = format!("inputs.{}", input.symbol);
+            if input.column.is_empty() {
+                return Some(fault(key, ErrorKind::Missing("name of a column")));
+            }
+            // Two symbols may read one column; the time column is not an input (`t` is there for that).
+            if let Some(earlier) = columns.get(input.column.as_str()).filter(|e| e.starts_with("the time")) {
+                let name = input.column.clone();
+                return Some(fault(key, ErrorKind::Duplicate { name, earlier: earlier.clone() }));
+            }
+        }
+        for input in &self.inputs {
+            columns.insert(&input.column, format!("the column of input `{}`", input.symbol));
+        }
+        for output in &self.outputs {
+            let key = format!("outputs.{}#key", output.column);
+            if output.column.is_empty() {
+                return Some(fault(key, ErrorKind::Missing("name of a column")));
+            }
+            if let Some(earlier) = columns.insert(&output.column, "an output".to_owned()) {
+                return Some(fault(key, ErrorKind::Duplicate { name: output.column.clone(), earlier }));
+            }
+        }
+        None
+    }
+
+    fn fault_in_parameters(&self) -> Option<Fault> {
+        for p in &self.parameters {
+            let key = |field: &str| format!("parameters.{}.{field}", p.name);
+            let bad = |field: &str, what, value, allowed: String| {
+                Some(fault(key(field), ErrorKind::BadNumber { what, value, allowed }))
+            };
+            for (field, what, value) in [
+                ("value", "the value", Some(p.value)),
+                ("min", "the lower bound", p.min),
+                ("max", "the upper bound", p.max),
+            ] {
+                if let Some(value) = value.filter(|v| !v.is_finite()) {
+                    return bad(field, what, value, "a finite number is needed".to_owned());
+                }
+            }
+            if let (Some(min), Some(max)) = (p.min, p.max) {
+                if min > max || (min == max && !p.fixed) {
+                    return bad("min", "the lower bound", min, format!("it must be below the upper bound {max}"));
+                }
+            }
+            if let Some(min) = p.min.filter(|min| p.value < *min) {
+                return bad("value", "the value", p.value, format!("it is below its lower bound {min}"));
+            }
+            if let Some(max) = p.max.filter(|max| p.value > *max) {
+                return bad("value", "the value", p.value, format!("it is above its upper bound {max}"));
+            }
+            if !p.fixed && p.min.is_none() && p.max.is_none() {
+                return Some(fault(format!("parameters.{}", p.name), ErrorKind::MissingBound));
+            }
+        }
+        None
+    }
+
+    fn fault_in_symbols(&self) -> Option<Fault> {
+        for (key, expr) in self.expressions() {
+            let mut bad = None;
+            expr.visit(&mut |e| {
+                if let Expr::Number(value) = e {
+                    if !value.is_finite() {
+                        bad = Some(*value);
+                    }
+                }
+            });
+            if let Some(value) = bad {
+                let allowed = "only finite numbers can stand in an equation".to_owned();
+                return Some(fault(key, ErrorKind::BadNumber { what: "a literal", value, allowed }));
+            }
+            for symbol in expr.symbols() {
+                if symbol == "t" || symbol == "pi" || self.defines(&symbol) {
+                    continue;
+                }
+                let hint = self.hint(&symbol);
+                return Some(fault_in(&key, &symbol, ErrorKind::UnknownSymbol { symbol: symbol.clone(), hint }));
+            }
+        }
+        None
+    }
+
+    fn hint(&self, symbol: &str) -> String {
+        let known = self.inputs.iter().map(|i| &i.symbol).chain(self.parameters.iter().map(|p| &p.name));
+        let known: Vec<&String> = known.chain(self.states.iter().map(|s| &s.name)).collect();
+        if let Some(input) = self.inputs.iter().find(|i| i.column == symbol) {
+            return format!("; the column `{symbol}` is called `{}` in the equations", input.symbol);
+        }
+        if let Some(near) = known.iter().find(|k| k.eq_ignore_ascii_case(symbol)) {
+            return format!("; is `{near}` meant?");
+        }
+        let names: Vec<&str> = known.iter().map(|s| s.as_str()).collect();
+        format!("; known: {} t pi", names.join(" "))
+    }
+
+    fn fault_in_initial_values(&self) -> Option<Fault> {
+        let initial = |name: &str| match self.state(name).map(|s| &s.initial) {
+            Some(Initial::Expr(e)) => e.symbols(),
+            _ => BTreeSet::new(),
+        };
+        for state in &self.states {
+            let key = format!("states.{}.initial", state.name);
+            match &state.initial {
+                Initial::Free => {}
+                Initial::Number(value) => {
+                    if !value.is_finite() {
+                        let allowed = "a finite number is needed".to_owned();
+                        return Some(fault(
+                            key,
+                            ErrorKind::BadNumber { what: "the initial value", value: *value, allowed },
+                        ));
+                    }
+                }
+                Initial::Expr(expr) => {
+                    for symbol in expr.symbols() {
+                        if self.state(&symbol).is_some() {
+                            // Follow the uses: a ring is named as such.
+                            let mut path = vec![state.name.clone(), symbol.clone()];
+                            while let Some(next) =
+                                path.last().and_then(|last| initial(last).into_iter().find(|s| self.state(s).is_some()))
+                            {
+                                let closed = path.contains(&next);
+                                path.push(next);
+                                if closed {
+                                    return Some(fault_in(&key, &symbol, ErrorKind::Cycle(path.join(" -> "))));
+                                }
+                            }
+                            if symbol == state.name {
+                                let kind = ErrorKind::Cycle(format!("{symbol} -> {symbol}"));
+                                return Some(fault_in(&key, &symbol, kind));
+                            }
+                            return Some(fault_in(&key, &symbol, ErrorKind::InitialUsesState(symbol.clone())));
+                        }
+                        if self.input(&symbol).is_some() || symbol == "t" {
+                            return Some(fault_in(&key, &symbol, ErrorKind::InitialNotConstant(symbol.clone())));
+                        }
+                    }
+                    if expr.has_memory() {
+                        let message = "an initial value cannot contain an operator with memory".to_owned();
+                        return Some(fault(key, ErrorKind::Memory(message)));
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    fn fault_in_memory(&self) -> Option<Fault> {
+        for (key, expr) in self.expressions() {
+            let mut message = None;
+            expr.visit(&mut |e| {
+                let Expr::Memory(memory, arguments) = e else { return };
+                let constant =
+                    |a: &Expr| !a.has_memory() && a.symbols().iter().all(|s| s == "pi" || self.parameter(s).is_some());
+                match memory {
+                    Memory::Derivative => {
+                        let of_inputs = arguments.iter().all(|a| {
+                            !a.has_memory()
+                                && a.symbols().iter().all(|s| self.state(s).is_none())
+                                && a.symbols().iter().any(|s| self.input(s).is_some())
+                        });
+                        if !of_inputs {
+                            message = Some(
+                                "`d(w)` is the time derivative of an input: w must be made of inputs and parameters"
+                                    .to_owned(),
+                            );
+                        }
+                    }
+                    Memory::Delay | Memory::Lag | Memory::Relay | Memory::Play => {
+                        if !arguments.iter().skip(1).all(constant) {
+                            let name = memory.name();
+                            let what = match memory {
+                                Memory::Play => "half-width",
+                                Memory::Relay => "thresholds",
+                                Memory::Delay => "delay",
+                                _ => "time constant",
+                            };
+                            message =
+                                Some(format!("the {what} of `{name}` must be made of parameters and numbers only"));
+                        }
+                    }
+                }
+            });
+            if let Some(message) = message {
+                return Some(fault(key, ErrorKind::Memory(message)));
+            }
+        }
+        None
+    }
+
+    fn fault_in_units(&self) -> Option<Fault> {
+        crate::dimension::first_clash(self).map(|(key, message)| fault(key, ErrorKind::UnitClash(message)))
+    }
+
+    fn fault_in_outputs(&self) -> Option<Fault> {
+        if self.outputs.is_empty() {
+            return Some(fault("outputs", ErrorKind::NothingDrivesOutput("there is no output".to_owned())));
+        }
+        // What each symbol rests on, through the equations: states that a state's derivative uses.
+        for output in &self.outputs {
+            let symbols = output.expression.symbols();
+            let moves = |s: &String| s == "t" || self.input(s).is_some() || self.state(s).is_some();
+            if !symbols.iter().any(moves) {
+                let message = "this output depends on no state and no input: it is a constant".to_owned();
+                return Some(fault(format!("outputs.{}", output.column), ErrorKind::NothingDrivesOutput(message)));
+            }
+        }
+        let uses_state = |e: &Expr| e.symbols().iter().any(|s| self.state(s).is_some());
+        if !self.is_static() && !self.outputs.iter().any(|o| uses_state(&o.expression)) {
+            let message = "no output depends on any state: nothing could be learnt about the equations".to_owned();
+            let key = self.outputs.first().map_or_else(String::new, |o| format!("outputs.{}", o.column));
+            return Some(fault(key, ErrorKind::NothingDrivesOutput(message)));
+        }
+        None
+    }
+}

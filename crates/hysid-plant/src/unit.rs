@@ -1,0 +1,245 @@
+//! Units as products of named factors (`N s/m`, `1/s^2`, `-`), with enough algebra to build new ones and to compare.
+//!
+//! A unit keeps the names that the user wrote. Two units are [comparable](Unit::same_dimension) when they reduce to the same
+//! dimension (`mm` and `m`, `N` and `kg m/s^2`); angles are dimensionless. A name that is not known is a dimension of its own.
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
+
+/// A product of named factors with integer exponents.
+///
+/// Text form: factors separated by spaces, `*` or `.`; at most one `/`, after which every factor divides (parentheses around
+/// them are allowed); `^` before an exponent; `-` or `1` or nothing is dimensionless.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Unit {
+    factors: Vec<(String, i32)>,
+}
+
+/// Why a text is not a unit.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is not a unit: {reason}; units look like `N s/m`, `1/s^2`, `deg` or `-`")]
+pub struct UnitError {
+    /// What was given.
+    pub text: String,
+    /// What is wrong with it.
+    pub reason: &'static str,
+}
+
+/// The base dimensions, as exponents by name.
+type Dimension = BTreeMap<&'static str, i32>;
+
+/// Known names: exponents of (m, kg, s, A, K).
+const KNOWN: &[(&str, [i32; 5])] = &[
+    ("m", [1, 0, 0, 0, 0]),
+    ("kg", [0, 1, 0, 0, 0]),
+    ("g", [0, 1, 0, 0, 0]),
+    ("t", [0, 1, 0, 0, 0]),
+    ("s", [0, 0, 1, 0, 0]),
+    ("min", [0, 0, 1, 0, 0]),
+    ("h", [0, 0, 1, 0, 0]),
+    ("A", [0, 0, 0, 1, 0]),
+    ("K", [0, 0, 0, 0, 1]),
+    ("degC", [0, 0, 0, 0, 1]),
+    ("N", [1, 1, -2, 0, 0]),
+    ("Nm", [2, 1, -2, 0, 0]),
+    ("Pa", [-1, 1, -2, 0, 0]),
+    ("bar", [-1, 1, -2, 0, 0]),
+    ("J", [2, 1, -2, 0, 0]),
+    ("W", [2, 1, -3, 0, 0]),
+    ("Hz", [0, 0, -1, 0, 0]),
+    ("V", [2, 1, -3, -1, 0]),
+    ("Ohm", [2, 1, -3, -2, 0]),
+    ("ohm", [2, 1, -3, -2, 0]),
+    ("H", [2, 1, -2, -2, 0]),
+    ("F", [-2, -1, 4, 2, 0]),
+    ("C", [0, 0, 1, 1, 0]),
+    ("Wb", [2, 1, -2, -1, 0]),
+    ("T", [0, 1, -2, -1, 0]),
+    ("L", [3, 0, 0, 0, 0]),
+    ("l", [3, 0, 0, 0, 0]),
+    ("rad", [0; 5]),
+    ("deg", [0; 5]),
+    ("rev", [0; 5]),
+    ("turn", [0; 5]),
+    ("percent", [0; 5]),
+    ("rpm", [0, 0, -1, 0, 0]),
+];
+const BASES: [&str; 5] = ["m", "kg", "s", "A", "K"];
+const PREFIXES: [&str; 8] = ["n", "u", "m", "c", "d", "k", "M", "G"];
+
+fn exponents(name: &str) -> Option<[i32; 5]> {
+    let find = |n: &str| KNOWN.iter().find(|(known, _)| *known == n).map(|(_, e)| *e);
+    find(name).or_else(|| {
+        PREFIXES.iter().find_map(|p| {
+            let rest = name.strip_prefix(p)?;
+            // Only units that take prefixes.
+            (!matches!(rest, "kg" | "min" | "h" | "degC" | "rpm" | "t" | "percent" | "rev" | "turn"))
+                .then(|| find(rest))?
+        })
+    })
+}
+
+impl Unit {
+    /// The dimensionless unit, printed `-`.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// The unit that `text` stands for.
+    ///
+    /// # Errors
+    /// A character or an exponent that does not belong there, or a second `/`.
+    pub fn parse(text: &str) -> Result<Self, UnitError> {
+        let fail = |reason| UnitError { text: text.to_owned(), reason };
+        let trimmed = text.trim();
+        if matches!(trimmed, "" | "-" | "1") {
+            return Ok(Self::none());
+        }
+        let mut halves = trimmed.split('/');
+        let above = halves.next().unwrap_or_default();
+        let below = halves.next();
+        if halves.next().is_some() {
+            return Err(fail("it has more than one `/`"));
+        }
+        let mut unit = Self::none();
+        for (half, sign) in [(Some(above), 1), (below, -1)] {
+            let Some(half) = half else { continue };
+            let mut half = half.trim();
+            if let Some(inner) = half.strip_prefix('(').and_then(|h| h.strip_suffix(')')) {
+                half = inner.trim();
+            }
+            if half.is_empty() {
+                return Err(fail("a factor is missing beside the `/`"));
+            }
+            for factor in half.split([' ', '*', '.', '·']).filter(|f| !f.is_empty()) {
+                if factor == "1" {
+                    continue;
+                }
+                let (name, exponent) = match factor.split_once('^') {
+                    None => (factor, 1),
+                    Some((name, exponent)) => {
+                        (name, exponent.parse::<i32>().map_err(|_| fail("an exponent is not an integer"))?)
+                    }
+                };
+                if !(1..=12).contains(&exponent.unsigned_abs()) {
+                    return Err(fail("an exponent is 0 or larger than 12"));
+                }
+                if name.is_empty() || !name.chars().all(|c| c.is_alphabetic() || matches!(c, '%' | '_' | '°')) {
+                    return Err(fail("a factor is not a name"));
+                }
+                unit.multiply(name, sign * exponent);
+            }
+        }
+        Ok(unit)
+    }
+
+    fn multiply(&mut self, name: &str, exponent: i32) {
+        match self.factors.iter_mut().find(|(n, _)| n == name) {
+            Some((_, e)) => *e = e.saturating_add(exponent),
+            None => self.factors.push((name.to_owned(), exponent)),
+        }
+        self.factors.retain(|(_, e)| *e != 0);
+    }
+
+    /// The product.
+    pub fn times(&self, other: &Self) -> Self {
+        let mut unit = self.clone();
+        other.factors.iter().for_each(|(name, e)| unit.multiply(name, *e));
+        unit
+    }
+
+    /// The quotient.
+    pub fn per(&self, other: &Self) -> Self {
+        self.times(&other.power(-1))
+    }
+
+    /// The integer power.
+    pub fn power(&self, exponent: i32) -> Self {
+        let mut factors = self.factors.clone();
+        factors.iter_mut().for_each(|(_, e)| *e = e.saturating_mul(exponent));
+        factors.retain(|(_, e)| *e != 0);
+        Self { factors }
+    }
+
+    /// The square root, where every exponent is even.
+    pub fn root(&self) -> Option<Self> {
+        let halves = self.factors.iter().map(|(n, e)| (e % 2 == 0).then(|| (n.clone(), e / 2)));
+        Some(Self { factors: halves.collect::<Option<_>>()? })
+    }
+
+    /// Whether no named factor is left.
+    pub fn is_none(&self) -> bool {
+        self.factors.is_empty()
+    }
+
+    fn dimension(&self) -> (Dimension, BTreeMap<&str, i32>) {
+        let mut known = Dimension::new();
+        let mut unknown = BTreeMap::new();
+        for (name, exponent) in &self.factors {
+            match exponents(name) {
+                Some(e) => {
+                    for (base, power) in BASES.iter().zip(e) {
+                        *known.entry(base).or_insert(0) += power.saturating_mul(*exponent);
+                    }
+                }
+                None if matches!(name.as_str(), "%" | "°") => {}
+                None => *unknown.entry(name.as_str()).or_insert(0) += exponent,
+            }
+        }
+        known.retain(|_, e| *e != 0);
+        unknown.retain(|_, e| *e != 0);
+        (known, unknown)
+    }
+
+    /// Whether both reduce to the same dimension; scale (`mm` against `m`) does not matter.
+    pub fn same_dimension(&self, other: &Self) -> bool {
+        self.dimension() == other.dimension()
+    }
+
+    /// Whether the unit reduces to a pure number (`-`, `rad`, `mm/m`).
+    pub fn is_dimensionless(&self) -> bool {
+        self.same_dimension(&Self::none())
+    }
+}
+
+impl Display for Unit {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if self.factors.is_empty() {
+            return f.write_str("-");
+        }
+        let side = |positive: bool| {
+            let chosen = self.factors.iter().filter(|(_, e)| (*e > 0) == positive);
+            let text = chosen.map(|(name, e)| match e.unsigned_abs() {
+                1 => name.clone(),
+                e => format!("{name}^{e}"),
+            });
+            text.collect::<Vec<_>>()
+        };
+        let (above, below) = (side(true), side(false));
+        f.write_str(if above.is_empty() { "1" } else { "" })?;
+        f.write_str(&above.join(" "))?;
+        match below.as_slice() {
+            [] => Ok(()),
+            [one] => write!(f, "/{one}"),
+            several => write!(f, "/({})", several.join(" ")),
+        }
+    }
+}
+
+impl Unit {
+    /// The unit that a column's name ends in: `force_N` gives `N`, `v_mm_s` gives `mm/s`; nothing where the end is not known.
+    pub fn of_column(column: &str) -> Option<Self> {
+        let parts: Vec<&str> = column.split('_').skip(1).collect();
+        let (&last, before) = parts.split_last()?;
+        // `_s`, `_s2` after a unit divide by it; alone they are seconds.
+        let per = match last {
+            "s" => Some(1),
+            "s2" => Some(2),
+            _ => None,
+        };
+        if let (Some(power), Some(numerator)) = (per, before.last().filter(|n| exponents(n).is_some())) {
+            return Some(Self { factors: vec![((*numerator).to_owned(), 1), ("s".to_owned(), -power)] });
+        }
+        exponents(last).map(|_| Self { factors: vec![(last.to_owned(), 1)] })
+    }
+}
