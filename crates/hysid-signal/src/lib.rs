@@ -3,6 +3,16 @@
 //! A [`Recording`] is a table of named channels on one uniform clock. A missing sample is `NaN`; [`Recording::segments`]
 //! gives the stretches without one. There are no files here (see `hysid-io`) and no models.
 
+mod excitation;
+mod noise;
 mod recording;
+mod spectrum;
+mod turning_points;
 
+pub use excitation::{Excitation, ExcitationError, modulate};
+pub use noise::{NoiseError, autoregressive_noise, variance_for_snr, white_noise};
 pub use recording::{Channel, Clock, Recording, RecordingError, Segment};
+pub use spectrum::{
+    CrossSpectrum, SpectrumError, correlation, cross_spectrum, fourier, inverse_fourier, power_spectrum,
+};
+pub use turning_points::{Turn, TurningPoint, turning_points};
