@@ -1,1 +1,4 @@
 //! From a simulation and a recording to a verdict: mismatch test, mechanisms, evidence, composition, experiment.
+
+pub mod evidence;
+mod random;

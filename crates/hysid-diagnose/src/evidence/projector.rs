@@ -1,0 +1,117 @@
+//! The projector onto the complement of what the simulation's own parameters and initial states can do.
+
+/// Inner product, summed in fixed order in four lanes.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (a, b) = (&a[..n], &b[..n]);
+    let mut acc = [0.0f64; 8];
+    let mut ca = a.chunks_exact(8);
+    let mut cb = b.chunks_exact(8);
+    for (x, y) in (&mut ca).zip(&mut cb) {
+        for i in 0..8 {
+            acc[i] += x[i] * y[i];
+        }
+    }
+    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
+    ((acc[0] + acc[4]) + (acc[1] + acc[5])) + ((acc[2] + acc[6]) + (acc[3] + acc[7])) + tail
+}
+
+/// Squared Euclidean norm.
+pub fn norm2(a: &[f64]) -> f64 {
+    dot(a, a)
+}
+
+/// An orthonormal basis and the projection off it.
+#[derive(Debug, Clone, Default)]
+pub struct Projector {
+    basis: Vec<Vec<f64>>,
+}
+
+/// A column whose part outside the basis is smaller than this share of its norm is taken as inside.
+const RANK_TOLERANCE: f64 = 1e-7;
+
+impl Projector {
+    /// The projector off the span of these columns; columns that are (nearly) linear combinations of earlier ones add nothing.
+    pub fn new(columns: impl IntoIterator<Item = Vec<f64>>) -> Self {
+        let mut p = Self::default();
+        for c in columns {
+            p.push(c);
+        }
+        p
+    }
+
+    /// Adds a column to the span; whether it added a dimension.
+    pub fn push(&mut self, mut column: Vec<f64>) -> bool {
+        let before = norm2(&column);
+        if !(before.is_finite() && before > 0.0) {
+            return false;
+        }
+        self.remove(&mut column);
+        let after = norm2(&column);
+        if after <= before * RANK_TOLERANCE * RANK_TOLERANCE {
+            return false;
+        }
+        let scale = 1.0 / after.sqrt();
+        column.iter_mut().for_each(|x| *x *= scale);
+        self.basis.push(column);
+        true
+    }
+
+    /// Dimension of the span.
+    pub fn rank(&self) -> usize {
+        self.basis.len()
+    }
+
+    /// The orthonormal basis.
+    pub fn basis(&self) -> &[Vec<f64>] {
+        &self.basis
+    }
+
+    /// Projects in place: twice, so that rounding cannot leave a visible part inside the span.
+    pub fn remove(&self, x: &mut [f64]) {
+        for _ in 0..2 {
+            for q in &self.basis {
+                let c = dot(q, x);
+                for (x, q) in x.iter_mut().zip(q) {
+                    *x -= c * q;
+                }
+            }
+        }
+    }
+
+    /// Sum of squares of the part of `x` inside the span.
+    pub fn inside(&self, x: &[f64]) -> f64 {
+        self.basis.iter().map(|q| dot(q, x).powi(2)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn what_is_left_is_orthogonal_and_projecting_twice_changes_nothing(
+            columns in prop::collection::vec(prop::collection::vec(-10.0f64..10.0, 30), 1..6),
+            x in prop::collection::vec(-10.0f64..10.0, 30),
+        ) {
+            let p = Projector::new(columns.clone());
+            let mut r = x.clone();
+            p.remove(&mut r);
+            for c in &columns {
+                prop_assert!(dot(c, &r).abs() < 1e-8);
+            }
+            prop_assert!((norm2(&x) - norm2(&r) - p.inside(&x)).abs() < 1e-8 * (1.0 + norm2(&x)));
+            let once = r.clone();
+            p.remove(&mut r);
+            prop_assert!(once.iter().zip(&r).all(|(a, b)| (a - b).abs() < 1e-10));
+        }
+    }
+
+    #[test]
+    fn a_dependent_column_adds_no_dimension() {
+        let p = Projector::new([vec![1.0, 0.0, 1.0], vec![0.0, 1.0, 0.0], vec![2.0, 3.0, 2.0]]);
+        assert_eq!(p.rank(), 2);
+    }
+}

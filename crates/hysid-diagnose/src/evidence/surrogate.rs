@@ -1,0 +1,227 @@
+//! The mismatch test: the largest score over all candidate effects, against surrogates in which residual and input are unrelated.
+//!
+//! A surrogate keeps the prewhitened residual's distribution and its short correlation and destroys its alignment with the inputs: each
+//! series is rolled by a random number of samples, then the sign of each block is drawn. Rolling alone cannot judge effects
+//! that survive it (an offset, a trend, a periodic excitation); blocks of random sign do. Multiplicity over effects and shapes is inside the
+//! maximum, so the p-value needs no correction.
+//!
+//! The features must come from *simulated* trajectories: measured ones carry the noise of the residual into the feature.
+
+use rand::RngExt;
+use rayon::prelude::*;
+
+use super::layout::Layout;
+use super::projector::{Projector, norm2};
+use super::score::{FeatureGroup, score};
+use crate::random::generator;
+
+/// How the test is run.
+#[derive(Debug, Clone, Copy)]
+pub struct TestOptions {
+    /// The level at which the caller will judge the p-value: decides how many surrogates are needed at least.
+    pub alpha: f64,
+    /// Seed of the surrogates.
+    pub seed: u64,
+}
+
+/// The outcome of the test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurrogateTest {
+    /// `(1 + surrogates with a score at least as large) / (1 + surrogates)`.
+    pub p_value: f64,
+    /// The largest score on the residual itself.
+    pub statistic: f64,
+    /// The group that has it.
+    pub best: Option<usize>,
+    /// Largest score of each surrogate, in order of drawing.
+    pub surrogates: Vec<f64>,
+}
+
+/// Samples until the autocorrelation of the series stays below 0.1, at least 1, over the longest series of the stack.
+pub fn correlation_time(layout: &Layout, r: &[f64]) -> usize {
+    let Some(s) = layout.series.iter().max_by_key(|s| s.rows.len()) else { return 1 };
+    let x = &r[s.rows.clone()];
+    let power = norm2(x);
+    if power <= 0.0 {
+        return 1;
+    }
+    let limit = (x.len() / 20).max(1);
+    (1..limit).find(|&k| (x[k..].iter().zip(x).map(|(a, b)| a * b).sum::<f64>() / power).abs() < 0.1).unwrap_or(limit)
+}
+
+/// The largest score over the groups, with the group.
+fn largest(groups: &[&FeatureGroup], r: &[f64], own: &Projector) -> (f64, Option<usize>) {
+    let total = norm2(r) - own.inside(r);
+    let mut best = (f64::NEG_INFINITY, None);
+    for (i, g) in groups.iter().enumerate() {
+        let s = score(total, g.explained(r), r.len(), g.columns.len());
+        if s > best.0 {
+            best = (s, Some(i));
+        }
+    }
+    best
+}
+
+/// One surrogate of `r`.
+fn surrogate(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> Vec<f64> {
+    let mut rng = generator(seed, 0x5u64 << 56 | index);
+    let mut out = vec![0.0; r.len()];
+    for s in &layout.series {
+        let x = &r[s.rows.clone()];
+        let n = x.len();
+        let guard = (10 * tau).min(n / 4);
+        let shift = if n > 2 * guard + 1 { rng.random_range(guard..n - guard) } else { 0 };
+        let o = &mut out[s.rows.clone()];
+        o[..shift].copy_from_slice(&x[n - shift..]);
+        o[shift..].copy_from_slice(&x[..n - shift]);
+        // Blocks of at least 10 correlation times; between 8 and 40 of them where the series is long enough.
+        let blocks = (n / (10 * tau).max(1)).clamp(8, 40).min(n.max(1));
+        let offset = rng.random_range(0..(n / blocks).max(1));
+        let mut sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
+        let length = (n / blocks).max(1);
+        for (i, v) in o.iter_mut().enumerate() {
+            if (i + offset) % length == 0 {
+                sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
+            }
+            *v *= sign;
+        }
+    }
+    out
+}
+
+/// Tests whether the whitened residual `r`, already projected off `own`, is related to any of the groups.
+///
+/// Surrogates are drawn in batches: a clear answer ends after 199, a close one goes on to `4/alpha` (at least 999).
+pub fn surrogate_test(groups: &[&FeatureGroup], layout: &Layout, own: &Projector, r: &[f64], options: TestOptions) -> SurrogateTest {
+    let (statistic, best) = largest(groups, r, own);
+    let tau = correlation_time(layout, r);
+    let alpha = options.alpha.clamp(1e-5, 0.5);
+    let first = ((1.0 / alpha).ceil() as usize).max(200) - 1;
+    let most = ((4.0 / alpha).ceil() as usize).max(1000) - 1;
+    let mut surrogates: Vec<f64> = Vec::new();
+    if groups.is_empty() {
+        return SurrogateTest { p_value: 1.0, statistic: 0.0, best: None, surrogates };
+    }
+    let p = |s: &[f64]| (1 + s.iter().filter(|&&v| v >= statistic).count()) as f64 / (1 + s.len()) as f64;
+    while surrogates.len() < most {
+        let start = surrogates.len();
+        let end = if start == 0 { first } else { (start + 200).min(most) };
+        let batch: Vec<f64> = (start..end)
+            .into_par_iter()
+            .map(|b| largest(groups, &surrogate(layout, r, tau, options.seed, b as u64), own).0)
+            .collect();
+        surrogates.extend(batch);
+        let exceeding = surrogates.iter().filter(|&&v| v >= statistic).count();
+        let highest = surrogates.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if exceeding >= 20 || (exceeding == 0 && statistic > highest + 6.0 && 1.0 / (1 + surrogates.len()) as f64 <= alpha) {
+            break;
+        }
+    }
+    SurrogateTest { p_value: p(&surrogates), statistic, best, surrogates }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evidence::{Series, Whitener};
+    use rand_distr::{Distribution, StandardNormal};
+
+    const N: usize = 1000;
+
+    /// A synthetic linear plant: 30 effects as filtered functions of a random input, 3 nuisance columns.
+    fn features(seed: u64) -> (Layout, Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        let mut rng = generator(seed, 99);
+        let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..N }], outputs: 1 };
+        let mut u: Vec<f64> = (0..N).map(|_| StandardNormal.sample(&mut rng)).collect();
+        let filter = |x: &mut Vec<f64>, a: f64| {
+            for n in 1..N {
+                x[n] += a * x[n - 1];
+            }
+        };
+        filter(&mut u, 0.8);
+        let mut own = vec![u.clone(), vec![1.0; N]];
+        let mut lagged = u.clone();
+        filter(&mut lagged, 0.9);
+        own.push(lagged);
+        let mut effects: Vec<Vec<f64>> = Vec::new();
+        for i in 0..30 {
+            let knee = 0.2 * f64::from(i);
+            let mut f: Vec<f64> = u.iter().enumerate().map(|(n, u)| match i % 4 {
+                0 => (u - knee).max(0.0),
+                1 => u.powi(1 + i / 4) / 10f64.powi(i / 4),
+                2 => n as f64 / N as f64 * (u.abs() - knee).max(0.0),
+                _ => (u * (1.0 + knee)).tanh(),
+            }).collect();
+            filter(&mut f, 0.7);
+            effects.push(f);
+        }
+        effects.push((0..N).map(|n| (n as f64 / N as f64).powi(2)).collect());
+        (layout, own, effects)
+    }
+
+    fn noise(kind: usize, seed: u64) -> Vec<f64> {
+        let mut rng = generator(seed, 7);
+        let mut e: Vec<f64> = (0..N).map(|_| StandardNormal.sample(&mut rng)).collect();
+        match kind {
+            0 => {}
+            1 => (1..N).for_each(|n| e[n] += 0.9 * e[n - 1]),
+            2 => (2..N).for_each(|n| e[n] += 1.7 * e[n - 1] - 0.9 * e[n - 2]),
+            _ => {
+                // Process noise through a resonance plus a little measurement noise: an ARMA process, not an AR one.
+                (2..N).for_each(|n| e[n] += 1.9 * e[n - 1] - 0.95 * e[n - 2]);
+                let scale = (norm2(&e) / N as f64).sqrt();
+                for v in &mut e {
+                    let w: f64 = StandardNormal.sample(&mut rng);
+                    *v += 0.1 * scale * w;
+                }
+            }
+        }
+        e
+    }
+
+    fn p_value(e: &[f64], seed: u64) -> f64 {
+        let (layout, own, effects) = features(seed);
+        let mut r0 = e.to_vec();
+        Projector::new(own.clone()).remove(&mut r0);
+        let whitener: Whitener = layout.fit_noise(&r0, 16);
+        let own = Projector::new(own.iter().map(|c| whitener.apply(&layout, c)));
+        let mut r = whitener.apply(&layout, e);
+        own.remove(&mut r);
+        let groups: Vec<FeatureGroup> =
+            effects.iter().filter_map(|f| FeatureGroup::new(std::slice::from_ref(f), &layout, &whitener, &own)).collect();
+        let refs: Vec<&FeatureGroup> = groups.iter().collect();
+        surrogate_test(&refs, &layout, &own, &r, TestOptions { alpha: 0.05, seed }).p_value
+    }
+
+    #[test]
+    fn false_alarms_come_at_the_nominal_rate_under_four_noises() {
+        for kind in 0..4 {
+            let alarms = (0..60).filter(|&s| p_value(&noise(kind, s), s) < 0.05).count();
+            // Nominal 3 of 60; more than 8 has probability below 1 %.
+            assert!(alarms <= 8, "noise {kind}: {alarms} of 60 alarms at 5 %");
+        }
+    }
+
+    #[test]
+    fn effects_half_as_large_as_the_noise_are_seen() {
+        for (effect, seed) in [(0usize, 3u64), (3, 4), (9, 5), (30, 6)] {
+            let (_, own, effects) = features(seed);
+            let mut f = effects[effect].clone();
+            Projector::new(own).remove(&mut f);
+            let scale = 0.5 / (norm2(&f) / N as f64).sqrt();
+            let e: Vec<f64> = noise(0, seed).iter().zip(&f).map(|(e, f)| e + scale * f).collect();
+            let p = p_value(&e, seed);
+            assert!(p < 0.01, "effect {effect}: p = {p}");
+        }
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_test_for_any_number_of_threads() {
+        let e = noise(1, 1);
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| p_value(&e, 1))
+        };
+        assert_eq!(run(1).to_bits(), run(3).to_bits());
+    }
+}
