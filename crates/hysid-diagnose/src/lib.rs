@@ -1,4 +1,6 @@
 //! From a simulation and a recording to a verdict: mismatch test, mechanisms, evidence, composition, experiment.
 
 pub mod evidence;
+pub mod file;
 mod random;
+pub mod refit;

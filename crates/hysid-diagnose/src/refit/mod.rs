@@ -1,0 +1,5 @@
+//! Refitting by simulation error: the least-squares engine and what it is fed with.
+
+mod lm;
+
+pub use lm::{Fit, LmOptions, Problem, levenberg_marquardt};
