@@ -46,7 +46,10 @@ impl ArModel {
 
     /// The same model with another innovation scale.
     pub fn rescaled(&self, factor: f64) -> Self {
-        Self { predictors: self.predictors.clone(), sigma: self.sigma.iter().map(|s| (s * factor).max(f64::MIN_POSITIVE)).collect() }
+        Self {
+            predictors: self.predictors.clone(),
+            sigma: self.sigma.iter().map(|s| (s * factor).max(f64::MIN_POSITIVE)).collect(),
+        }
     }
 
     /// Whitens one contiguous stretch into `out` (same length): unit variance where the model holds.

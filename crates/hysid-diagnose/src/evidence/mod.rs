@@ -15,7 +15,7 @@ mod projector;
 mod score;
 mod surrogate;
 
-pub use ar::{ArModel, AR_ORDERS, fit_ar};
+pub use ar::{AR_ORDERS, ArModel, fit_ar};
 pub use layout::{Layout, Series, Whitener};
 pub use projector::{Projector, dot, norm2};
 pub use score::{FeatureGroup, detectable_amplitude, score};

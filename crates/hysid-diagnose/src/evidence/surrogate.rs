@@ -92,7 +92,13 @@ fn surrogate(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> V
 /// Tests whether the whitened residual `r`, already projected off `own`, is related to any of the groups.
 ///
 /// Surrogates are drawn in batches: a clear answer ends after 199, a close one goes on to `4/alpha` (at least 999).
-pub fn surrogate_test(groups: &[&FeatureGroup], layout: &Layout, own: &Projector, r: &[f64], options: TestOptions) -> SurrogateTest {
+pub fn surrogate_test(
+    groups: &[&FeatureGroup],
+    layout: &Layout,
+    own: &Projector,
+    r: &[f64],
+    options: TestOptions,
+) -> SurrogateTest {
     let (statistic, best) = largest(groups, r, own);
     let tau = correlation_time(layout, r);
     let alpha = options.alpha.clamp(1e-5, 0.5);
@@ -113,7 +119,9 @@ pub fn surrogate_test(groups: &[&FeatureGroup], layout: &Layout, own: &Projector
         surrogates.extend(batch);
         let exceeding = surrogates.iter().filter(|&&v| v >= statistic).count();
         let highest = surrogates.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if exceeding >= 20 || (exceeding == 0 && statistic > highest + 6.0 && 1.0 / (1 + surrogates.len()) as f64 <= alpha) {
+        if exceeding >= 20
+            || (exceeding == 0 && statistic > highest + 6.0 && 1.0 / (1 + surrogates.len()) as f64 <= alpha)
+        {
             break;
         }
     }
@@ -146,12 +154,16 @@ mod tests {
         let mut effects: Vec<Vec<f64>> = Vec::new();
         for i in 0..30 {
             let knee = 0.2 * f64::from(i);
-            let mut f: Vec<f64> = u.iter().enumerate().map(|(n, u)| match i % 4 {
-                0 => (u - knee).max(0.0),
-                1 => u.powi(1 + i / 4) / 10f64.powi(i / 4),
-                2 => n as f64 / N as f64 * (u.abs() - knee).max(0.0),
-                _ => (u * (1.0 + knee)).tanh(),
-            }).collect();
+            let mut f: Vec<f64> = u
+                .iter()
+                .enumerate()
+                .map(|(n, u)| match i % 4 {
+                    0 => (u - knee).max(0.0),
+                    1 => u.powi(1 + i / 4) / 10f64.powi(i / 4),
+                    2 => n as f64 / N as f64 * (u.abs() - knee).max(0.0),
+                    _ => (u * (1.0 + knee)).tanh(),
+                })
+                .collect();
             filter(&mut f, 0.7);
             effects.push(f);
         }
@@ -187,8 +199,10 @@ mod tests {
         let own = Projector::new(own.iter().map(|c| whitener.apply(&layout, c)));
         let mut r = whitener.apply(&layout, e);
         own.remove(&mut r);
-        let groups: Vec<FeatureGroup> =
-            effects.iter().filter_map(|f| FeatureGroup::new(std::slice::from_ref(f), &layout, &whitener, &own)).collect();
+        let groups: Vec<FeatureGroup> = effects
+            .iter()
+            .filter_map(|f| FeatureGroup::new(std::slice::from_ref(f), &layout, &whitener, &own))
+            .collect();
         let refs: Vec<&FeatureGroup> = groups.iter().collect();
         surrogate_test(&refs, &layout, &own, &r, TestOptions { alpha: 0.05, seed }).p_value
     }

@@ -100,11 +100,18 @@ pub fn levenberg_marquardt(
         iterations += 1;
         let columns: Vec<Vec<f64>> = jacobian.iter().map(|c| whiten(c)).collect();
         let gradient: Vec<f64> = columns.iter().map(|c| dot(c, &white)).collect();
-        let span = |i: usize| if bounds[i].0.is_finite() && bounds[i].1.is_finite() { bounds[i].1 - bounds[i].0 } else { theta[i].abs().max(1e-12) };
+        let span = |i: usize| {
+            if bounds[i].0.is_finite() && bounds[i].1.is_finite() {
+                bounds[i].1 - bounds[i].0
+            } else {
+                theta[i].abs().max(1e-12)
+            }
+        };
         let free: Vec<usize> = (0..k)
             .filter(|&i| {
                 let edge = 1e-9 * span(i);
-                let blocked = (theta[i] <= bounds[i].0 + edge && gradient[i] < 0.0) || (theta[i] >= bounds[i].1 - edge && gradient[i] > 0.0);
+                let blocked = (theta[i] <= bounds[i].0 + edge && gradient[i] < 0.0)
+                    || (theta[i] >= bounds[i].1 - edge && gradient[i] > 0.0);
                 !blocked && norm2(&columns[i]) > 0.0 && columns[i].iter().all(|x| x.is_finite())
             })
             .collect();
@@ -210,7 +217,8 @@ impl Fit {
             })
             .collect();
         let scale: Vec<f64> = columns.iter().map(|c| norm2(c).sqrt()).collect();
-        let free: Vec<usize> = (0..k).filter(|&i| scale[i] > 0.0 && scale[i].is_finite() && !self.at_bound[i]).collect();
+        let free: Vec<usize> =
+            (0..k).filter(|&i| scale[i] > 0.0 && scale[i].is_finite() && !self.at_bound[i]).collect();
         let m = free.len();
         let mut gram = DMatrix::zeros(m, m);
         for (a, &i) in free.iter().enumerate() {
@@ -233,10 +241,14 @@ impl Fit {
     /// `ln |J' J|` of the whitened Jacobian over the parameters that are not at a bound, and their number.
     pub fn log_information(&self, layout: &Layout, whitener: &Whitener, scales: &[f64]) -> (f64, usize) {
         let columns: Vec<Vec<f64>> = self.jacobian.iter().map(|c| whitener.apply(layout, c)).collect();
-        let free: Vec<usize> = (0..self.theta.len()).filter(|&i| !self.at_bound[i] && norm2(&columns[i]) > 0.0).collect();
+        let free: Vec<usize> =
+            (0..self.theta.len()).filter(|&i| !self.at_bound[i] && norm2(&columns[i]) > 0.0).collect();
         let m = free.len();
-        let gram = DMatrix::from_fn(m, m, |a, b| dot(&columns[free[a]], &columns[free[b]]) * scales[free[a]] * scales[free[b]]);
-        let log = gram.cholesky().map_or(f64::NEG_INFINITY, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
+        let gram = DMatrix::from_fn(m, m, |a, b| {
+            dot(&columns[free[a]], &columns[free[b]]) * scales[free[a]] * scales[free[b]]
+        });
+        let log =
+            gram.cholesky().map_or(f64::NEG_INFINITY, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
         (log, m)
     }
 }
@@ -294,7 +306,14 @@ mod tests {
         assert_eq!(f.theta[0], 2.0);
         assert_eq!(f.at_bound, vec![true, false]);
         // Given a = 2 the best b solves a one-dimensional problem: compare with a scan.
-        let cost = |b: f64| (0..50).map(|i| { let t = i as f64 * 0.1; (3.0 * (-0.7 * t).exp() - 2.0 * (-b * t).exp()).powi(2) }).sum::<f64>();
+        let cost = |b: f64| {
+            (0..50)
+                .map(|i| {
+                    let t = i as f64 * 0.1;
+                    (3.0 * (-0.7 * t).exp() - 2.0 * (-b * t).exp()).powi(2)
+                })
+                .sum::<f64>()
+        };
         let scan = (0..20_000).map(|i| i as f64 * 1e-4).min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap();
         assert!((f.theta[1] - scan).abs() < 2e-4, "{} {scan}", f.theta[1]);
     }
@@ -309,6 +328,10 @@ mod tests {
         let (a, b) = (&f.jacobian[0], &f.jacobian[1]);
         let (aa, ab, bb) = (dot(a, a) / 0.01, dot(a, b) / 0.01, dot(b, b) / 0.01);
         let det = aa * bb - ab * ab;
-        assert!((c[0] - bb / det).abs() < 1e-6 * c[0] && (c[3] - aa / det).abs() < 1e-6 * c[3] && (c[1] + ab / det).abs() < 1e-6 * c[1].abs());
+        assert!(
+            (c[0] - bb / det).abs() < 1e-6 * c[0]
+                && (c[3] - aa / det).abs() < 1e-6 * c[3]
+                && (c[1] + ab / det).abs() < 1e-6 * c[1].abs()
+        );
     }
 }
