@@ -1,0 +1,174 @@
+//! The design matrix: a dictionary on recordings, one row for each sample with all its lags, never stored.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use hysid_linalg::Columns;
+
+use crate::record::{FIRST_SIGN, differences, next_sign};
+use crate::{Dictionary, DictionaryError, Factor, Quantity, Record, Signal, Term};
+
+/// One stretch of rows: the samples `first..first + len` of one record.
+#[derive(Debug, Clone)]
+pub(crate) struct Stretch {
+    /// Number of the first row.
+    pub row: usize,
+    /// Record that the samples are of.
+    pub record: usize,
+    /// First sample.
+    pub first: usize,
+    /// Number of rows.
+    pub len: usize,
+}
+
+/// A dictionary on recordings. Rows are in the order of records and time; columns are the dictionary's terms.
+#[derive(Debug, Clone)]
+pub struct Design<'d> {
+    dictionary: &'d Dictionary,
+    /// For each record, each quantity that a term uses, sample by sample.
+    channels: Vec<HashMap<Quantity, Vec<f64>>>,
+    stretches: Vec<Stretch>,
+    rows: usize,
+    records: usize,
+}
+
+impl<'d> Design<'d> {
+    /// The design matrix of `dictionary` on `records`.
+    ///
+    /// A row is a sample whose output is known and whose lags (up to the dictionary's reach) lie in the same gap-free
+    /// stretch.
+    ///
+    /// # Errors
+    /// A record whose inputs are not as many as the dictionary's or not as long as its output; no row at all.
+    pub fn new(dictionary: &'d Dictionary, records: &[Record<'_>]) -> Result<Self, DictionaryError> {
+        let expected = dictionary.signals().inputs().len();
+        let mut quantities: Vec<Quantity> =
+            dictionary.terms().iter().flat_map(|t| t.factors().iter().map(|f| f.quantity)).collect();
+        quantities.push(Quantity::Value(Signal::Output));
+        quantities.sort();
+        quantities.dedup();
+        let reach = dictionary.reach();
+        let (mut channels, mut stretches, mut rows, mut longest) = (Vec::new(), Vec::new(), 0, 0);
+        for (r, record) in records.iter().enumerate() {
+            let bad = |problem: String| DictionaryError::BadRecord { record: r, problem };
+            if record.inputs.len() != expected {
+                return Err(bad(format!("it has {} inputs, the dictionary {expected}", record.inputs.len())));
+            }
+            if let Some(u) = record.inputs.iter().find(|u| u.len() != record.y.len()) {
+                return Err(bad(format!("an input has {} samples, the output {}", u.len(), record.y.len())));
+            }
+            let whole = record.whole();
+            for range in &whole {
+                longest = longest.max(range.len());
+                if range.len() > reach {
+                    let len = range.len() - reach;
+                    stretches.push(Stretch { row: rows, record: r, first: range.start + reach, len });
+                    rows += len;
+                }
+            }
+            channels.push(quantities.iter().map(|&q| (q, channel(dictionary, record, &whole, q))).collect());
+        }
+        if rows == 0 {
+            return Err(DictionaryError::TooShort { longest, lag: reach });
+        }
+        Ok(Self { dictionary, channels, stretches, rows, records: records.len() })
+    }
+
+    /// The dictionary.
+    pub fn dictionary(&self) -> &'d Dictionary {
+        self.dictionary
+    }
+
+    /// The target: the output at each row.
+    pub fn target(&self) -> Vec<f64> {
+        let mut y = vec![0.0; self.rows];
+        self.fill_factor(Factor::value(Signal::Output, 0), 0..self.rows, &mut y, |o, v| *o = v);
+        y
+    }
+
+    /// Record and sample of each row.
+    pub fn samples(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.stretches.iter().flat_map(|s| (s.first..s.first + s.len).map(move |n| (s.record, n)))
+    }
+
+    /// The rows of each record, in the order of the records; a record without rows has an empty range.
+    pub fn rows_of_records(&self) -> Vec<Range<usize>> {
+        let mut rows = Vec::with_capacity(self.records);
+        let mut at = 0;
+        for r in 0..self.records {
+            let len: usize = self.stretches.iter().filter(|s| s.record == r).map(|s| s.len).sum();
+            rows.push(at..at + len);
+            at += len;
+        }
+        rows
+    }
+
+    /// The whole column of a term, which need not be in the dictionary but may only use its quantities and reach.
+    pub(crate) fn fill_term(&self, term: &Term, rows: Range<usize>, out: &mut [f64]) {
+        let mut factors = term.factors().iter();
+        match factors.next() {
+            None => out.fill(1.0),
+            Some(&first) => self.fill_factor(first, rows.clone(), out, |o, v| *o = v),
+        }
+        for &f in factors {
+            self.fill_factor(f, rows.clone(), out, |o, v| *o *= v);
+        }
+    }
+
+    fn fill_factor(&self, factor: Factor, rows: Range<usize>, out: &mut [f64], join: impl Fn(&mut f64, f64)) {
+        let mut at = self.stretches.partition_point(|s| s.row + s.len <= rows.start);
+        let mut done = rows.start;
+        while done < rows.end && at < self.stretches.len() {
+            let s = &self.stretches[at];
+            let end = rows.end.min(s.row + s.len);
+            let from = s.first + (done - s.row) - factor.lag;
+            let source = &self.channels[s.record][&factor.quantity][from..from + (end - done)];
+            for (o, &v) in out[done - rows.start..end - rows.start].iter_mut().zip(source) {
+                join(o, v);
+            }
+            done = end;
+            at += 1;
+        }
+    }
+}
+
+/// One quantity of a record, sample by sample; 0 outside the gap-free stretches.
+fn channel(dictionary: &Dictionary, record: &Record<'_>, whole: &[Range<usize>], quantity: Quantity) -> Vec<f64> {
+    let signal = quantity.signal();
+    let x: &[f64] = match signal {
+        Signal::Output => record.y,
+        Signal::Input(i) => record.inputs[i],
+    };
+    let mut out = vec![0.0; x.len()];
+    for range in whole {
+        let (from, to) = (&x[range.clone()], &mut out[range.clone()]);
+        match quantity {
+            Quantity::Value(_) => to.copy_from_slice(from),
+            Quantity::Difference(_) => differences(from, to),
+            Quantity::Sign(_) => {
+                differences(from, to);
+                let threshold = dictionary.signals().name(signal).map_or(0.0, |n| n.threshold);
+                let mut sign = FIRST_SIGN;
+                for o in to {
+                    sign = next_sign(sign, *o, threshold);
+                    *o = sign;
+                }
+            }
+        }
+    }
+    out
+}
+
+impl Columns for Design<'_> {
+    fn rows(&self) -> usize {
+        self.rows
+    }
+
+    fn cols(&self) -> usize {
+        self.dictionary.len()
+    }
+
+    fn fill(&self, j: usize, rows: Range<usize>, out: &mut [f64]) {
+        self.fill_term(&self.dictionary.terms()[j], rows, out);
+    }
+}

@@ -1,0 +1,68 @@
+//! The inner products that a search works on: columns of the Gram matrix, made when first asked for and kept.
+//!
+//! Columns and target have unit length here, so the Gram matrix is that of cosines and energies are parts of y'y.
+
+use std::collections::HashMap;
+
+use hysid_linalg::Columns;
+
+use crate::SelectError;
+
+/// How many columns of the Gram matrix one pass over the samples makes at most.
+const PER_PASS: usize = 8;
+
+/// The inner products of unit columns with each other and with the unit target.
+pub(crate) struct Moments<'a, C: ?Sized> {
+    phi: &'a C,
+    /// 1 / norm of each column; 0 for a column of zeros.
+    scale: Vec<f64>,
+    /// Inner product of each unit column with the unit target.
+    pub cross: Vec<f64>,
+    /// y'y.
+    pub target_energy: f64,
+    gram: HashMap<usize, Vec<f64>>,
+}
+
+impl<'a, C: Columns + ?Sized> Moments<'a, C> {
+    pub fn new(phi: &'a C, y: &[f64]) -> Result<Self, SelectError> {
+        let start = phi.start(y);
+        if let Some(j) = start.norms.iter().zip(&start.cross).position(|(n, c)| !n.is_finite() || !c.is_finite()) {
+            return Err(SelectError::NotFinite(format!("column {j}")));
+        }
+        let scale: Vec<f64> = start.norms.iter().map(|n| if *n > 0.0 { 1.0 / n.sqrt() } else { 0.0 }).collect();
+        let target = start.target.sqrt();
+        let cross = start.cross.iter().zip(&scale).map(|(c, s)| c * s / target).collect();
+        Ok(Self { phi, scale, cross, target_energy: start.target, gram: HashMap::new() })
+    }
+
+    pub fn len(&self) -> usize {
+        self.scale.len()
+    }
+
+    pub fn is_zero(&self, j: usize) -> bool {
+        self.scale[j] == 0.0
+    }
+
+    pub fn has(&self, j: usize) -> bool {
+        self.gram.contains_key(&j)
+    }
+
+    /// Makes column `j`, and in the same pass those of `likely` that fit and are not there yet.
+    pub fn make(&mut self, j: usize, likely: impl IntoIterator<Item = usize>) {
+        if self.has(j) {
+            return;
+        }
+        let mut which = vec![j];
+        which.extend(likely.into_iter().filter(|k| *k != j && !self.has(*k)).take(PER_PASS - 1));
+        let columns = self.phi.gram_columns(&which);
+        for (c, &k) in which.iter().enumerate() {
+            let column = columns.col(c).iter().zip(&self.scale).map(|(g, s)| g * s * self.scale[k]).collect();
+            self.gram.insert(k, column);
+        }
+    }
+
+    /// Column `j` of the matrix of cosines; empty when it was not made.
+    pub fn column(&self, j: usize) -> &[f64] {
+        self.gram.get(&j).map_or(&[], Vec::as_slice)
+    }
+}

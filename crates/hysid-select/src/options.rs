@@ -1,0 +1,156 @@
+//! How to search, what decides the size, and the limits.
+
+use std::ops::Range;
+
+/// How subsets of columns are looked for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Search {
+    /// Equations (8) to (10) of Zhang, Zhu, Gu (2017) as printed: the column with the largest squared inner product with
+    /// the residual per squared norm, raw columns throughout, no orthogonalisation and no refit inside the loop
+    /// (plain matching pursuit).
+    MatchingPursuit,
+    /// Classical orthogonal forward regression: every candidate is orthogonalised against the columns chosen so far, and
+    /// the one with the largest error reduction ratio is taken.
+    Greedy,
+}
+
+/// The form of the leave-one-out criterion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PressForm {
+    /// Equation (15): the sum of squared leave-one-out errors e_t / (1 - h_tt).
+    Exact,
+    /// Equation (18) as printed: SSE / (1 - n/N).
+    AsPrinted,
+    /// Equation (18) with the square that it lacks: SSE / (1 - n/N)^2.
+    Squared,
+}
+
+/// What decides the number of terms.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Criterion {
+    /// So many terms.
+    Terms(usize),
+    /// Equation (11): as many terms as leave at most this part of y'y unexplained (1 - sum of ERR).
+    ErrTolerance(f64),
+    /// The smallest leave-one-out error.
+    Press(PressForm),
+    /// The smallest sum of squared errors on blocks of rows that the coefficients were not fitted to, each block left
+    /// out once. For time series, whose neighbouring samples are no independent witnesses; blocks may be whole recordings.
+    /// Rows in no block always take part in the fit.
+    Blocks(Vec<Range<usize>>),
+    /// The smallest Akaike criterion, N ln(SSE/N) + 2 n.
+    Aic,
+    /// The smallest Bayes criterion, N ln(SSE/N) + n ln N.
+    Bic,
+}
+
+/// How to select.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// How subsets are looked for.
+    pub search: Search,
+    /// What decides the number of terms.
+    pub criterion: Criterion,
+    /// The largest number of terms that is tried.
+    pub max_terms: usize,
+    /// Columns that are taken first, in this order.
+    pub forced: Vec<usize>,
+    /// A candidate of which less than this part of its energy is left beside the chosen columns is passed over and
+    /// reported.
+    pub pivot_guard: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            search: Search::Greedy,
+            criterion: Criterion::Press(PressForm::Exact),
+            max_terms: 30,
+            forced: Vec::new(),
+            pivot_guard: 1e-11,
+        }
+    }
+}
+
+/// Bad input to a selection.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SelectError {
+    /// The target has another length than the matrix has rows.
+    #[error("the matrix has {rows} rows, the target {found}")]
+    Shape {
+        /// Rows of the matrix.
+        rows: usize,
+        /// Length of the target.
+        found: usize,
+    },
+    /// There is nothing to choose from, or no sample.
+    #[error("a matrix of {rows} rows and {cols} columns leaves nothing to select")]
+    Empty {
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        cols: usize,
+    },
+    /// The target is zero throughout.
+    #[error("the target is zero throughout: there is nothing to explain")]
+    ZeroTarget,
+    /// The target or a column holds a value that is not finite.
+    #[error("{0} holds a value that is not finite (or too large to be squared)")]
+    NotFinite(String),
+    /// An option is out of range.
+    #[error("option {option} is {given}; allowed: {allowed}")]
+    Option {
+        /// The option.
+        option: &'static str,
+        /// What was given.
+        given: String,
+        /// What is allowed.
+        allowed: String,
+    },
+}
+
+impl Options {
+    pub(crate) fn check(&self, rows: usize, cols: usize, y: &[f64]) -> Result<(), SelectError> {
+        if y.len() != rows {
+            return Err(SelectError::Shape { rows, found: y.len() });
+        }
+        if rows == 0 || cols == 0 {
+            return Err(SelectError::Empty { rows, cols });
+        }
+        if y.iter().any(|v| !(v * v).is_finite()) {
+            return Err(SelectError::NotFinite("the target".into()));
+        }
+        if y.iter().all(|v| *v == 0.0) {
+            return Err(SelectError::ZeroTarget);
+        }
+        let option = |option, given: String, allowed: &str| Err(SelectError::Option { option, given, allowed: allowed.into() });
+        if self.max_terms == 0 {
+            return option("max_terms", "0".into(), "1 or more");
+        }
+        if !(self.pivot_guard >= 0.0 && self.pivot_guard < 1.0) {
+            return option("pivot_guard", self.pivot_guard.to_string(), "0 up to 1");
+        }
+        for (i, j) in self.forced.iter().enumerate() {
+            if *j >= cols || self.forced[..i].contains(j) {
+                return option("forced", format!("{:?}", self.forced), &format!("different columns below {cols}"));
+            }
+        }
+        match &self.criterion {
+            Criterion::Terms(0) => option("criterion", "0 terms".into(), "1 term or more"),
+            Criterion::ErrTolerance(rho) if !(*rho > 0.0 && *rho < 1.0) => {
+                option("criterion", format!("ERR tolerance {rho}"), "above 0 and below 1")
+            }
+            Criterion::Blocks(blocks) => {
+                let mut sorted: Vec<&Range<usize>> = blocks.iter().filter(|b| !b.is_empty()).collect();
+                sorted.sort_by_key(|b| b.start);
+                let overlap = sorted.windows(2).any(|w| w[0].end > w[1].start);
+                if sorted.len() < 2 || overlap || sorted.last().is_some_and(|b| b.end > rows) {
+                    return option("criterion", format!("blocks {blocks:?}"), &format!("two or more blocks of rows below {rows} that do not overlap"));
+                }
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
