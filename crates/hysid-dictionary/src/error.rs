@@ -18,7 +18,9 @@ pub enum DictionaryError {
     #[error("the name `{0}` stands for two signals")]
     AmbiguousName(String),
     /// A name that cannot be written in a term.
-    #[error("`{0}` cannot name a signal: a symbol is a letter followed by letters, digits and `_`, and no name holds a backtick")]
+    #[error(
+        "`{0}` cannot name a signal: a symbol is a letter followed by letters, digits and `_`, and no name holds a backtick"
+    )]
     BadName(String),
     /// The output at lag 0 cannot explain itself.
     #[error("lag 0 of the output is the target itself; output lags start at 1")]
@@ -60,7 +62,9 @@ pub enum DictionaryError {
         problem: String,
     },
     /// No sample has all its lags.
-    #[error("no sample has all its lags inside one gap-free stretch: the longest stretch has {longest} samples, the largest lag is {lag}")]
+    #[error(
+        "no sample has all its lags inside one gap-free stretch: the longest stretch has {longest} samples, the largest lag is {lag}"
+    )]
     TooShort {
         /// Length of the longest stretch.
         longest: usize,

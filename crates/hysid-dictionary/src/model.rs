@@ -96,7 +96,13 @@ impl Model {
     ///
     /// # Errors
     /// Inputs that differ in number from the model's or in length, or a start that is shorter than the reach.
-    pub fn free_run(&self, inputs: &[&[f64]], start: &[f64], length: usize, limit: f64) -> Result<Run, DictionaryError> {
+    pub fn free_run(
+        &self,
+        inputs: &[&[f64]],
+        start: &[f64],
+        length: usize,
+        limit: f64,
+    ) -> Result<Run, DictionaryError> {
         let bad = |problem: String| DictionaryError::BadRecord { record: 0, problem };
         if inputs.len() != self.signals.inputs().len() {
             let expected = self.signals.inputs().len();

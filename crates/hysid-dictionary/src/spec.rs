@@ -192,7 +192,8 @@ impl Spec {
         }
         terms.extend(self.include.iter().cloned());
         for (text, same_as) in written {
-            dropped.push(Dropped { text, reason: DroppedReason::SignSquared { same_as: self.signals.format(&same_as) } });
+            dropped
+                .push(Dropped { text, reason: DroppedReason::SignSquared { same_as: self.signals.format(&same_as) } });
         }
         let Span { kept, collinear } = drop_collinear(terms.into_iter().collect());
         for (term, within) in collinear {

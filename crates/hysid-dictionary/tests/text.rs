@@ -29,7 +29,24 @@ fn texts_and_the_terms_they_say() {
 
 #[test]
 fn bad_texts_are_refused_with_the_place() {
-    let cases = ["", "y", "y[n]", "y[n-1]*", "x[n]", "u1[n+1]", "2*u1[n]", "u1[n]^0", "sgn(u1[n])", "u1[m]", "`y[n]", "u1[n-1", "u3[n]", "y[n-1]u1[n]", "u1[n-999999999]", "du1[n]^"];
+    let cases = [
+        "",
+        "y",
+        "y[n]",
+        "y[n-1]*",
+        "x[n]",
+        "u1[n+1]",
+        "2*u1[n]",
+        "u1[n]^0",
+        "sgn(u1[n])",
+        "u1[m]",
+        "`y[n]",
+        "u1[n-1",
+        "u3[n]",
+        "y[n-1]u1[n]",
+        "u1[n-999999999]",
+        "du1[n]^",
+    ];
     for text in cases {
         assert!(two().parse(text).is_err(), "{text}");
     }

@@ -82,8 +82,7 @@ mod tests {
             let mut at = 0;
             while at < rows {
                 let n = tile.min(rows - at);
-                let mut t: Vec<f64> =
-                    (0..cols).flat_map(|j| a[j * rows + at..j * rows + at + n].to_vec()).collect();
+                let mut t: Vec<f64> = (0..cols).flat_map(|j| a[j * rows + at..j * rows + at + n].to_vec()).collect();
                 qr.push(n, &mut t);
                 at += n;
             }

@@ -150,8 +150,7 @@ fn finish_path<C: Columns + ?Sized>(
     let whole = refit(phi, y, path, energy);
     let values: Vec<f64> = (0..path.len())
         .map(|k| {
-            let facts =
-                Facts { terms: k + 1, samples, sse: whole.sse[k], press: whole.press[k], blocks: f64::NAN };
+            let facts = Facts { terms: k + 1, samples, sse: whole.sse[k], press: whole.press[k], blocks: f64::NAN };
             value(&options.criterion, facts)
         })
         .collect();

@@ -124,7 +124,8 @@ impl Options {
         if y.iter().all(|v| *v == 0.0) {
             return Err(SelectError::ZeroTarget);
         }
-        let option = |option, given: String, allowed: &str| Err(SelectError::Option { option, given, allowed: allowed.into() });
+        let option =
+            |option, given: String, allowed: &str| Err(SelectError::Option { option, given, allowed: allowed.into() });
         if self.max_terms == 0 {
             return option("max_terms", "0".into(), "1 or more");
         }
@@ -146,7 +147,11 @@ impl Options {
                 sorted.sort_by_key(|b| b.start);
                 let overlap = sorted.windows(2).any(|w| w[0].end > w[1].start);
                 if sorted.len() < 2 || overlap || sorted.last().is_some_and(|b| b.end > rows) {
-                    return option("criterion", format!("blocks {blocks:?}"), &format!("two or more blocks of rows below {rows} that do not overlap"));
+                    return option(
+                        "criterion",
+                        format!("blocks {blocks:?}"),
+                        &format!("two or more blocks of rows below {rows} that do not overlap"),
+                    );
                 }
                 Ok(())
             }
