@@ -158,7 +158,8 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused() {
         let (u, y) = system(10);
-        let e = |inputs: &[&[f64]], y: &[f64]| LinearArx::estimate(&[ArxRecord { inputs, output: y }], 2, 1).unwrap_err();
+        let e =
+            |inputs: &[&[f64]], y: &[f64]| LinearArx::estimate(&[ArxRecord { inputs, output: y }], 2, 1).unwrap_err();
         assert!(matches!(e(&[&u[..9]], &y), BaselineError::UnequalLengths { .. }));
         assert!(matches!(e(&[&u[..5]], &y[..5]), BaselineError::LeastSquares(_)));
         assert!(matches!(e(&[&u[..1]], &y[..1]), BaselineError::LeastSquares(_)));

@@ -1,3 +1,4 @@
+//! Judging a model on a recording: error measures with a named normaliser, residual tests, loop areas, errors by branch, baselines.
 //!
 //! * [`measure`] says how far a prediction is from the measurement; nothing is normalised without the normaliser's name.
 //! * [`residual_tests`] asks whether the residual still holds what a better model could have explained (Billings and Voon).

@@ -35,9 +35,8 @@ pub fn loop_areas(u: &[f64], y: &[f64], threshold: f64) -> Vec<Loop> {
             }
             let next = |i: usize| (i + 1) % u.len();
             let area = (0..u.len()).map(|i| 0.5 * (y[i] + y[next(i)]) * (u[next(i)] - u[i])).sum();
-            let extent = |x: &[f64]| {
-                x.iter().copied().fold(f64::MIN, f64::max) - x.iter().copied().fold(f64::MAX, f64::min)
-            };
+            let extent =
+                |x: &[f64]| x.iter().copied().fold(f64::MIN, f64::max) - x.iter().copied().fold(f64::MAX, f64::min);
             let gap = y.last()? - y.first()?;
             Some(Loop { range, area, width: extent(u), height: extent(y), gap })
         })
