@@ -2,5 +2,6 @@
 
 pub mod evidence;
 pub mod file;
+pub mod picture;
 mod random;
 pub mod refit;
