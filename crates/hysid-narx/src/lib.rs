@@ -1,1 +1,21 @@
 //! The identified model: estimate, one-step, k-step and free run, uncertainty, noise model, equilibria, export.
+//!
+//! [`NarxModel`] is what identification returns and `model.json` holds: terms with coefficients, immutable. [`Trainer`] is
+//! where it comes from: recordings made ready, least squares, simulation-error refinement, and the search for the next term
+//! by what it would do to the *free run*. A [`Derived`] input is computed from a recorded one (an operator with memory, a
+//! filter, a soft threshold) before the polynomial sees it. A free run that diverges is a result, not an error.
+
+mod bank;
+mod derived;
+mod error;
+mod normal;
+mod program;
+mod refine;
+mod run;
+mod trainer;
+
+pub use bank::Bank;
+pub use derived::{Derived, Law};
+pub use error::NarxError;
+pub use run::Window;
+pub use trainer::{Evaluate, Fit, Gain, Refine, RunError, Trainer};
