@@ -57,7 +57,7 @@ impl<'d> Design<'d> {
             if let Some(u) = record.inputs.iter().find(|u| u.len() != record.y.len()) {
                 return Err(bad(format!("an input has {} samples, the output {}", u.len(), record.y.len())));
             }
-            let whole = record.whole();
+            let whole = record.gap_free();
             for range in &whole {
                 longest = longest.max(range.len());
                 if range.len() > reach {

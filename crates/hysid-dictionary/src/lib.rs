@@ -47,7 +47,7 @@ pub use design::Design;
 pub use dictionary::{Dictionary, Dropped, DroppedReason};
 pub use error::DictionaryError;
 pub use model::{Model, Run};
-pub use record::Record;
+pub use record::{FIRST_SIGN, Record, next_sign};
 pub use signals::{SignalName, Signals};
 pub use spec::{Constant, Rule, Spec};
 pub use term::{Factor, Quantity, Signal, Term};

@@ -25,7 +25,7 @@ impl<'a> Record<'a> {
     }
 
     /// The gap-free stretches, in order.
-    pub(crate) fn whole(&self) -> Vec<Range<usize>> {
+    pub fn gap_free(&self) -> Vec<Range<usize>> {
         let all = [0..self.y.len()];
         let allowed: &[Range<usize>] = self.stretches.as_deref().unwrap_or(&all);
         let mut found = Vec::new();
@@ -59,9 +59,9 @@ pub(crate) fn differences(x: &[f64], out: &mut [f64]) {
 }
 
 /// The sign after a difference, given the sign before it.
-pub(crate) fn next_sign(before: f64, difference: f64, threshold: f64) -> f64 {
+pub fn next_sign(before: f64, difference: f64, threshold: f64) -> f64 {
     if difference.abs() <= threshold { before } else { difference.signum() }
 }
 
 /// The sign at the beginning of a stretch.
-pub(crate) const FIRST_SIGN: f64 = 1.0;
+pub const FIRST_SIGN: f64 = 1.0;

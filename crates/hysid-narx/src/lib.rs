@@ -8,6 +8,8 @@
 mod bank;
 mod derived;
 mod error;
+mod file;
+mod model;
 mod normal;
 mod program;
 mod refine;
@@ -17,5 +19,7 @@ mod trainer;
 pub use bank::Bank;
 pub use derived::{Derived, Law};
 pub use error::NarxError;
+pub use file::{LoadError, MODEL_FORMAT, MODEL_VERSION};
+pub use model::{Coefficient, NarxModel, NoiseTerm, Parts, Prediction};
 pub use run::Window;
 pub use trainer::{Evaluate, Fit, Gain, Refine, RunError, Trainer};

@@ -38,11 +38,10 @@ pub(crate) enum Scope {
     CoefficientsAndDerived,
 }
 
-/// The refined point and its mean squared free-run error; infinite where even the first run diverges.
+/// The refined point and its run, which may be a diverged one if even the first was.
 #[derive(Debug, Clone)]
 pub(crate) struct Refined {
     pub point: Point,
-    pub mse: f64,
     pub outcome: Outcome,
 }
 
@@ -97,7 +96,7 @@ pub(crate) fn refine(
             break;
         }
     }
-    Ok(Refined { point: at, mse, outcome })
+    Ok(Refined { point: at, outcome })
 }
 
 pub(crate) fn mean(outcome: &Outcome) -> f64 {

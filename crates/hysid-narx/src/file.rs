@@ -1,0 +1,201 @@
+//! The model file: its own structs, converted at the edge, so that the file outlives the types in memory.
+
+use std::path::Path;
+
+use hysid_dictionary::{SignalName, Signals};
+use hysid_io::{InputError, WriteError};
+use serde::{Deserialize, Serialize};
+
+use crate::model::{Coefficient, NoiseTerm, Parts};
+use crate::{Derived, Law, NarxError, NarxModel};
+
+/// The name of the format in the file.
+pub const MODEL_FORMAT: &str = "hysid.model";
+/// The version of the format that is written.
+pub const MODEL_VERSION: u64 = 1;
+
+/// What can go wrong when a model file is read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// The file cannot be read or is not of this format.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// It does not describe a model.
+    #[error("{file}: {source}")]
+    Model {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: NarxError,
+    },
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct FileSignal {
+    symbol: String,
+    column: String,
+    #[serde(default)]
+    sign_threshold: f64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(tag = "law", rename_all = "snake_case")]
+enum FileLaw {
+    Play { half_width: f64 },
+    Dahl { length: f64 },
+    Filter { a: Vec<f64> },
+    SoftThreshold { centre: f64, width: f64 },
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct FileDerived {
+    symbol: String,
+    of: String,
+    #[serde(default)]
+    sign_threshold: f64,
+    #[serde(flatten)]
+    law: FileLaw,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct FileTerm {
+    term: String,
+    coefficient: f64,
+    standard_error: Option<f64>,
+    err: Option<f64>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct FileNoise {
+    term: String,
+    residual_lag: usize,
+    coefficient: f64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct FileModel {
+    output: FileSignal,
+    inputs: Vec<FileSignal>,
+    derived: Vec<FileDerived>,
+    period_s: Option<f64>,
+    decimation: usize,
+    limit: f64,
+    terms: Vec<FileTerm>,
+    noise: Vec<FileNoise>,
+}
+
+impl NarxModel {
+    /// Writes the model as JSON.
+    ///
+    /// # Errors
+    /// A path that cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), WriteError> {
+        hysid_io::write_versioned(path, MODEL_FORMAT, MODEL_VERSION, &to_file(self.parts()))
+    }
+
+    /// Reads a model that [`NarxModel::save`] wrote.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is of another format or a newer version, or does not describe a model.
+    pub fn load(path: &Path) -> Result<Self, LoadError> {
+        let (_, file): (u64, FileModel) = hysid_io::read_versioned(path, MODEL_FORMAT, MODEL_VERSION)?;
+        let model = from_file(file).and_then(NarxModel::new);
+        model.map_err(|source| LoadError::Model { file: path.display().to_string(), source })
+    }
+}
+
+fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}
+
+fn to_file(parts: &Parts) -> FileModel {
+    let name = |n: &SignalName| FileSignal {
+        symbol: n.symbol.clone(),
+        column: n.column.clone(),
+        sign_threshold: n.threshold,
+    };
+    let inputs = parts.signals.inputs();
+    let recorded = inputs.len() - parts.derived.len();
+    let derived = parts.derived.iter().zip(&inputs[recorded..]).map(|(d, n)| FileDerived {
+        symbol: n.symbol.clone(),
+        of: inputs[d.source].symbol.clone(),
+        sign_threshold: n.threshold,
+        law: match &d.law {
+            Law::Play { half_width } => FileLaw::Play { half_width: *half_width },
+            Law::Dahl { length } => FileLaw::Dahl { length: *length },
+            Law::Filter { a } => FileLaw::Filter { a: a.clone() },
+            Law::SoftThreshold { centre, width } => FileLaw::SoftThreshold { centre: *centre, width: *width },
+        },
+    });
+    FileModel {
+        output: name(parts.signals.output()),
+        inputs: inputs[..recorded].iter().map(name).collect(),
+        derived: derived.collect(),
+        period_s: parts.period_s,
+        decimation: parts.decimation,
+        limit: parts.limit,
+        terms: parts
+            .coefficients
+            .iter()
+            .map(|c| FileTerm {
+                term: parts.signals.format(&c.term),
+                coefficient: c.theta,
+                standard_error: finite(c.standard_error),
+                err: finite(c.err),
+            })
+            .collect(),
+        noise: parts
+            .noise
+            .iter()
+            .map(|t| FileNoise { term: parts.signals.format(&t.term), residual_lag: t.lag, coefficient: t.theta })
+            .collect(),
+    }
+}
+
+fn from_file(file: FileModel) -> Result<Parts, NarxError> {
+    let name = |s: FileSignal| SignalName { symbol: s.symbol, column: s.column, threshold: s.sign_threshold };
+    let mut inputs: Vec<SignalName> = file.inputs.into_iter().map(name).collect();
+    let mut derived = Vec::new();
+    for d in file.derived {
+        let Some(source) = inputs.iter().position(|n| n.symbol == d.of) else {
+            let problem = format!("there is no input `{}` before it", d.of);
+            return Err(NarxError::BadDerived { symbol: d.symbol, problem });
+        };
+        let law = match d.law {
+            FileLaw::Play { half_width } => Law::Play { half_width },
+            FileLaw::Dahl { length } => Law::Dahl { length },
+            FileLaw::Filter { a } => Law::Filter { a },
+            FileLaw::SoftThreshold { centre, width } => Law::SoftThreshold { centre, width },
+        };
+        inputs.push(SignalName { symbol: d.symbol.clone(), column: d.symbol.clone(), threshold: d.sign_threshold });
+        derived.push(Derived { symbol: d.symbol, source, law });
+    }
+    let signals = Signals::new(name(file.output), inputs)?;
+    let coefficients = file
+        .terms
+        .into_iter()
+        .map(|t| {
+            Ok(Coefficient {
+                term: signals.parse(&t.term)?,
+                theta: t.coefficient,
+                standard_error: t.standard_error.unwrap_or(f64::NAN),
+                err: t.err.unwrap_or(f64::NAN),
+            })
+        })
+        .collect::<Result<Vec<_>, NarxError>>()?;
+    let noise = file
+        .noise
+        .into_iter()
+        .map(|t| Ok(NoiseTerm { term: signals.parse(&t.term)?, lag: t.residual_lag, theta: t.coefficient }))
+        .collect::<Result<Vec<_>, NarxError>>()?;
+    Ok(Parts {
+        signals,
+        derived,
+        coefficients,
+        noise,
+        limit: file.limit,
+        period_s: file.period_s,
+        decimation: file.decimation,
+    })
+}
