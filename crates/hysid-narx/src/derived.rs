@@ -59,7 +59,9 @@ impl Law {
                 let a: Vec<String> = a.iter().map(|v| format!("{v:.6}")).collect();
                 format!("{x} filtered by 1/(1, {})", a.join(", "))
             }
-            Self::SoftThreshold { centre, width } => format!("the part of {x} above {centre:.6}, rounded over {width:.6}"),
+            Self::SoftThreshold { centre, width } => {
+                format!("the part of {x} above {centre:.6}, rounded over {width:.6}")
+            }
         }
     }
 

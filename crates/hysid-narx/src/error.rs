@@ -19,7 +19,9 @@ pub enum NarxError {
         problem: String,
     },
     /// Fewer samples than parameters.
-    #[error("{samples} usable samples are fewer than the {parameters} parameters; give a longer recording or fewer terms")]
+    #[error(
+        "{samples} usable samples are fewer than the {parameters} parameters; give a longer recording or fewer terms"
+    )]
     TooFewSamples {
         /// Samples that have all their lags.
         samples: usize,

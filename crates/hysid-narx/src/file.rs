@@ -110,11 +110,8 @@ fn finite(x: f64) -> Option<f64> {
 }
 
 fn to_file(parts: &Parts) -> FileModel {
-    let name = |n: &SignalName| FileSignal {
-        symbol: n.symbol.clone(),
-        column: n.column.clone(),
-        sign_threshold: n.threshold,
-    };
+    let name =
+        |n: &SignalName| FileSignal { symbol: n.symbol.clone(), column: n.column.clone(), sign_threshold: n.threshold };
     let inputs = parts.signals.inputs();
     let recorded = inputs.len() - parts.derived.len();
     let derived = parts.derived.iter().zip(&inputs[recorded..]).map(|(d, n)| FileDerived {

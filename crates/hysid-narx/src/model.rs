@@ -249,8 +249,10 @@ impl NarxModel {
 
     /// Whether a factor of a term is a sign of a difference of the output: the model is then discontinuous in its own output.
     pub fn switches_on_output(&self) -> bool {
-        self.parts.coefficients.iter().flat_map(|c| c.term.factors()).any(|f| {
-            f.quantity.is_sign() && f.quantity.signal() == Signal::Output
-        })
+        self.parts
+            .coefficients
+            .iter()
+            .flat_map(|c| c.term.factors())
+            .any(|f| f.quantity.is_sign() && f.quantity.signal() == Signal::Output)
     }
 }

@@ -99,7 +99,15 @@ impl Program {
     ///
     /// Both are at least the reach.
     #[inline]
-    pub(crate) fn factor_values(&self, n: usize, i: usize, y: &[f64], sign: &[f64], inputs: &Inputs<'_>, v: &mut [f64]) {
+    pub(crate) fn factor_values(
+        &self,
+        n: usize,
+        i: usize,
+        y: &[f64],
+        sign: &[f64],
+        inputs: &Inputs<'_>,
+        v: &mut [f64],
+    ) {
         for (v, f) in v.iter_mut().zip(&self.factors) {
             *v = match *f {
                 Source::Output(l) => y[i - l],

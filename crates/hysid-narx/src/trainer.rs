@@ -179,7 +179,13 @@ impl Trainer {
     ///
     /// # Errors
     /// Windows of recordings that there are not.
-    pub fn refine(&mut self, fit: Fit, windows: &[Window], steps: usize, what: Refine) -> Result<(Fit, RunError), NarxError> {
+    pub fn refine(
+        &mut self,
+        fit: Fit,
+        windows: &[Window],
+        steps: usize,
+        what: Refine,
+    ) -> Result<(Fit, RunError), NarxError> {
         self.enter(&fit.derived);
         let scope = match what {
             Refine::Coefficients => refine::Scope::Coefficients,

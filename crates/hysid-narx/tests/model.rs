@@ -104,7 +104,8 @@ fn a_model_survives_its_file() {
         Derived { symbol: "w3".into(), source: 0, law: Law::Dahl { length: 0.5 } },
         Derived { symbol: "w4".into(), source: 2, law: Law::SoftThreshold { centre: 0.1, width: 0.2 } },
     ];
-    let mut p = parts(&[("y[n-1]", 1.0 / 3.0), ("w1[n]*w2[n-1]", 0.1), ("w3[n]", 1e-300), ("w4[n]*sgn(du[n])", 2.0)], derived);
+    let mut p =
+        parts(&[("y[n-1]", 1.0 / 3.0), ("w1[n]*w2[n-1]", 0.1), ("w3[n]", 1e-300), ("w4[n]*sgn(du[n])", 2.0)], derived);
     p.noise = vec![NoiseTerm { term: p.signals.parse("1").unwrap(), lag: 2, theta: -0.3 }];
     let model = NarxModel::new(p).unwrap();
     let dir = tempfile::tempdir().unwrap();
