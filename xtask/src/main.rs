@@ -1,6 +1,7 @@
 //! Tasks of this repository; `cargo xtask --help` lists them.
 
 mod layers;
+mod prove;
 
 use std::path::{Path, PathBuf};
 
@@ -18,6 +19,7 @@ struct Cli {
 enum Task {
     /// Check the house rules of `xtask/layers.toml`.
     Layers,
+    Prove(prove::Args),
 }
 
 /// The root of the workspace.
@@ -27,6 +29,7 @@ pub fn root() -> PathBuf {
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().task {
+        Task::Prove(args) => prove::run(&args),
         Task::Layers => {
             let found = layers::breaches(&root())?;
             anyhow::ensure!(found.is_empty(), "{}", found.join("\n"));

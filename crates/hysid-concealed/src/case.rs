@@ -1,0 +1,430 @@
+//! One case: what is concealed where, the recordings, and the label.
+
+use serde::Serialize;
+
+use crate::body::Kind;
+use crate::design::{Design, Source, suits};
+use crate::excite::Excitation;
+use crate::input::{Hold, Input};
+use crate::law::{Effect, Law, Place};
+use crate::machine::Machine;
+use crate::noise::{Noise, convert, round_to};
+use crate::seed::Random;
+use crate::strength::{Tuned, measure, spread, tune};
+
+/// What sort of case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, PartialOrd, Ord, Hash)]
+#[serde(rename_all = "snake_case")]
+pub enum Group {
+    /// Nothing is missing.
+    Control,
+    /// One effect of the catalogue.
+    Single,
+    /// Two effects of different families.
+    Pair,
+    /// Three effects of different families.
+    Triple,
+    /// One effect that the catalogue does not have.
+    Outside,
+}
+
+/// One concealed effect as the label tells it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Concealed {
+    /// Mechanism.
+    pub mechanism: &'static str,
+    /// Family.
+    pub family: &'static str,
+    /// Slots that are right: the true one first, then those that no recording of this plant can tell from it.
+    pub slots: Vec<String>,
+    /// Mechanisms (with family) that are the same law on this plant.
+    pub same: Vec<(&'static str, &'static str)>,
+    /// Parameters by name.
+    pub parameters: Vec<(&'static str, f64)>,
+}
+
+/// The label of a case.
+#[derive(Debug, Clone, Serialize)]
+pub struct Label {
+    /// Name of the folder.
+    pub id: String,
+    /// Sort of case.
+    pub group: Group,
+    /// Plant.
+    pub plant: Kind,
+    /// Excitation of the estimation record.
+    pub excitation: Excitation,
+    /// Course of the command between samples.
+    pub hold: Hold,
+    /// Samples to estimate from.
+    pub samples: usize,
+    /// Sampling period in seconds.
+    pub period: f64,
+    /// Kind of noise.
+    pub noise: Noise,
+    /// Noise over rms of the output.
+    pub noise_level: f64,
+    /// Standard deviation of the noise on each output.
+    pub sigma: Vec<f64>,
+    /// Bits of the converter.
+    pub bits: u32,
+    /// Difficulty asked for; 0 for a control.
+    pub dnr_asked: f64,
+    /// Difficulty reached.
+    pub dnr: f64,
+    /// What is concealed.
+    pub effects: Vec<Concealed>,
+    /// True parameters of the plant.
+    pub theta: Vec<(&'static str, f64)>,
+    /// Parameters that the simulation file declares.
+    pub declared: Vec<(&'static str, f64)>,
+    /// Draws that were thrown away before this one.
+    pub rejected: usize,
+}
+
+/// A recording: input, outputs with noise, outputs without.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// Input as recorded.
+    pub input: Input,
+    /// Outputs as recorded.
+    pub y: Vec<Vec<f64>>,
+    /// Outputs without noise and converter.
+    pub clean: Vec<Vec<f64>>,
+}
+
+/// A case with everything that the scorer may need.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// Label.
+    pub label: Label,
+    /// Design.
+    pub design: Design,
+    /// True machine.
+    pub machine: Machine,
+    /// Recording to estimate from.
+    pub est: Record,
+    /// Hold-out recording.
+    pub val: Record,
+    /// A recording at 1.5 times the amplitude, never shown.
+    pub louder: Option<Record>,
+    /// `baseline.sim.toml`.
+    pub simulation: String,
+    /// First time stamp in seconds.
+    pub clock: f64,
+}
+
+/// What is asked of a case.
+#[derive(Debug, Clone)]
+pub struct Wanted {
+    /// Name of the folder.
+    pub id: String,
+    /// Sort of case.
+    pub group: Group,
+    /// Law of the first effect, where the bank plans it.
+    pub law: Option<Law>,
+    /// Noise of a control.
+    pub noise: Option<Noise>,
+}
+
+const DRAWS: usize = 60;
+/// Shares of the plants among those that suit an effect, in the order of [`Kind::ALL`].
+const PLANTS: [f64; 13] = [25.0, 14.0, 9.0, 7.0, 4.0, 6.0, 4.0, 4.0, 3.0, 3.0, 4.0, 3.0, 14.0];
+/// Detection needs information: `N DNR^2` of a case is at least this.
+pub const LEAST_INFORMATION: f64 = 25.0;
+
+impl Case {
+    /// Draws a case; `None` when no draw of this law makes the difficulty asked for.
+    pub fn draw(wanted: &Wanted, random: &mut Random) -> Option<Self> {
+        (0..DRAWS).find_map(|rejected| Self::attempt(wanted, &mut random.fork(), rejected))
+    }
+
+    fn attempt(wanted: &Wanted, random: &mut Random, rejected: usize) -> Option<Self> {
+        let control = wanted.group == Group::Control;
+        let law = wanted.law.unwrap_or(Law::Coulomb);
+        let weights: Vec<f64> =
+            Kind::ALL.iter().zip(PLANTS).map(|(k, w)| if control || suits(*k, law) { w } else { 0.0 }).collect();
+        let kind = Kind::ALL[random.weighted(&weights)];
+        let dnr = match wanted.group {
+            Group::Control => 0.0,
+            _ if law == Law::Quantisation => random.pick(&[1.0, 3.0]),
+            Group::Single => random.pick(&[0.1, 0.2, 0.5, 1.0, 3.0]),
+            Group::Pair | Group::Triple => random.pick(&[0.5, 1.0, 3.0]),
+            Group::Outside => random.pick(&[0.2, 0.5, 1.0, 3.0]),
+        };
+        let samples = samples(dnr, random);
+        let design = Design::draw(kind, samples, random);
+        let noise_kind = wanted.noise.unwrap_or_else(|| {
+            [Noise::White, Noise::Autoregressive, Noise::Process, Noise::Outliers]
+                [random.weighted(&[70.0, 18.0, 8.0, 4.0])]
+        });
+        let noise_level =
+            if design.gains.is_some() { random.pick(&[0.005, 0.01]) } else { random.pick(&[0.005, 0.01, 0.02, 0.05]) };
+        let source = design.source(random, design.excitation, samples);
+        let mut laws = if control { Vec::new() } else { vec![law] };
+        let more = match wanted.group {
+            Group::Pair => 1,
+            Group::Triple => 2,
+            _ => 0,
+        };
+        for _ in 0..more {
+            laws.push(companion(kind, &laws, random)?);
+        }
+        let units: Vec<Effect> = laws.iter().map(|l| design.effect(*l, &source, random)).collect::<Option<_>>()?;
+        let seen = noise_kind.samples(random, samples);
+        let tuned = if control {
+            measure(&design, &source, &[], &[], noise_level, &seen, 0)?
+        } else {
+            tune(&design, &source, &units, dnr, noise_level, &seen)?
+        };
+        let bits = 12 + random.below(5) as u32;
+        let headroom = random.uniform(1.1, 2.0);
+        let machine = tuned.machine.clone();
+        let looped = matches!(source, Source::Reference(_));
+        let mut est = Record { input: tuned.input.clone(), y: tuned.y.clone(), clean: tuned.y.clone() };
+        add_noise(&mut est, &machine, noise_kind, &tuned.sigma, looped.then_some(&seen), random)?;
+        let clocked = machine.effects.iter().any(|e| matches!(e.law.place(), Place::Parameter | Place::Disturbance));
+        let length = if clocked { samples } else { samples.min(4000) };
+        let excitation = if random.chance(0.5) { design.excitation } else { Excitation::SteppedMultisine };
+        let fresh = design.source(random, excitation, length);
+        let val_noise = noise_kind.samples(random, length);
+        let mut val = record(&design, &machine, &fresh, &val_noise, &tuned)?;
+        add_noise(&mut val, &machine, noise_kind, &tuned.sigma, looped.then_some(&val_noise), random)?;
+        let louder = record(&design, &machine, &fresh.louder(1.5), &val_noise, &tuned);
+        for record in [&mut est, &mut val] {
+            for (column, clean) in record.y.iter_mut().zip(&tuned.y) {
+                let full = clean.iter().fold(0.0_f64, |a, v| a.max(v.abs())) * headroom * 1.3;
+                convert(column, bits, full);
+            }
+        }
+        let declared: Vec<f64> = kind
+            .parameters()
+            .iter()
+            .zip(&design.theta)
+            .map(|(name, v)| {
+                let wrong = if *name == "a_s" { random.uniform(0.1, 0.2) } else { random.uniform(0.1, 0.4) };
+                v * (1.0 + random.sign() * wrong)
+            })
+            .collect();
+        let clock = if random.chance(0.3) { 0.5 * design.period } else { 0.0 };
+        let speed = spread(&rates(&est.clean[0], design.period));
+        let regularised = match machine.effects.iter().find(|e| e.law == Law::SolverArtefact) {
+            Some(e) => Some(e.p[0]),
+            None if random.chance(0.5) => Some(0.002 * speed),
+            None => None,
+        };
+        let simulation = simulation(&design, &declared, regularised, random);
+        let names = kind.parameters();
+        let label = Label {
+            id: wanted.id.clone(),
+            group: wanted.group,
+            plant: kind,
+            excitation: design.excitation,
+            hold: design.hold,
+            samples,
+            period: design.period,
+            noise: noise_kind,
+            noise_level,
+            sigma: tuned.sigma.clone(),
+            bits,
+            dnr_asked: dnr,
+            dnr: if control { 0.0 } else { tuned.dnr },
+            effects: machine.effects.iter().map(|e| concealed(&design, e)).collect(),
+            theta: names.iter().copied().zip(design.theta.iter().copied()).collect(),
+            declared: names.iter().copied().zip(declared).collect(),
+            rejected,
+        };
+        Some(Self { label, design, machine, est, val, louder, simulation, clock })
+    }
+}
+
+fn rates(x: &[f64], period: f64) -> Vec<f64> {
+    x.windows(2).map(|w| (w[1] - w[0]) / period).collect()
+}
+
+/// A length that leaves enough information at this difficulty.
+fn samples(dnr: f64, random: &mut Random) -> usize {
+    let lengths = [1000, 2000, 4000, 8000, 20_000];
+    let weights = [30.0, 30.0, 27.0, 9.0, 4.0];
+    let allowed: Vec<f64> = lengths
+        .iter()
+        .zip(weights)
+        .map(|(n, w)| if dnr > 0.0 && *n as f64 * dnr * dnr < LEAST_INFORMATION { 0.0 } else { w })
+        .collect();
+    lengths[random.weighted(&allowed)]
+}
+
+/// A further effect of another family that suits the plant and does not stand in the way of those already there.
+fn companion(kind: Kind, have: &[Law], random: &mut Random) -> Option<Law> {
+    let clash = |a: Law, b: Law| {
+        let hysteresis = |l: Law| matches!(l.family(), "actuator_hysteresis" | "play");
+        let friction = |l: Law| matches!(l.family(), "dry_friction" | "presliding" | "hysteretic_spring");
+        a.family() == b.family()
+            || (hysteresis(a) && hysteresis(b))
+            || (friction(a) && friction(b))
+            || (a.place() == Place::Parameter && b.place() == Place::Parameter)
+            || a == Law::SolverArtefact
+            || b == Law::SolverArtefact
+    };
+    let list: Vec<Law> = Law::ALL
+        .iter()
+        .copied()
+        .filter(|l| !l.outside() && *l != Law::Quantisation && suits(kind, *l) && !have.iter().any(|h| clash(*h, *l)))
+        .collect();
+    (!list.is_empty()).then(|| random.pick(&list))
+}
+
+/// A run of the true machine on a fresh source.
+fn record(design: &Design, machine: &Machine, source: &Source, noise: &[f64], tuned: &Tuned) -> Option<Record> {
+    let seen: Vec<f64> = noise.iter().map(|v| v * tuned.sigma[0]).collect();
+    let (input, clean) = design.run(machine, source, &seen)?;
+    clean.iter().flatten().all(|v| v.is_finite()).then(|| Record { input, y: clean.clone(), clean })
+}
+
+/// Adds noise of standard deviation `sigma`; what a controller has seen is what is recorded.
+fn add_noise(
+    record: &mut Record,
+    machine: &Machine,
+    kind: Noise,
+    sigma: &[f64],
+    seen: Option<&Vec<f64>>,
+    random: &mut Random,
+) -> Option<()> {
+    let n = record.input.len();
+    let process = kind == Noise::Process && seen.is_none() && matches!(record.input, Input::Held { .. });
+    if process {
+        // The unknown force is scaled so that it makes half of the noise power on the first output.
+        let force = Noise::Autoregressive.samples(random, n);
+        let mut size = 0.01 * spread_of_input(&record.input);
+        for _ in 0..4 {
+            let scaled: Vec<f64> = force.iter().map(|f| f * size).collect();
+            let y = machine.run(&record.input, Some(&scaled)).ok()?;
+            let off: Vec<f64> = y[0].iter().zip(&record.clean[0]).map(|(a, b)| a - b).collect();
+            let rms = (off.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt();
+            record.y = y;
+            let ratio = sigma[0] * 0.5_f64.sqrt() / rms.max(f64::MIN_POSITIVE);
+            if (ratio - 1.0).abs() < 0.03 {
+                break;
+            }
+            size *= ratio;
+        }
+    }
+    let share = if process { 0.5_f64.sqrt() } else { 1.0 };
+    for (channel, (column, s)) in record.y.iter_mut().zip(sigma).enumerate() {
+        let fresh;
+        let e = match (seen, channel) {
+            (Some(seen), 0) => seen,
+            _ => {
+                fresh = kind.samples(random, n);
+                &fresh
+            }
+        };
+        for (v, e) in column.iter_mut().zip(e) {
+            *v += share * s * e;
+        }
+        if kind == Noise::Quantised {
+            round_to(column, *s);
+        }
+    }
+    Some(())
+}
+
+fn spread_of_input(input: &Input) -> f64 {
+    match input {
+        Input::Held { values, .. } => spread(values),
+        Input::Motion { .. } => 1.0,
+    }
+}
+
+/// The label of an effect.
+fn concealed(design: &Design, e: &Effect) -> Concealed {
+    let kind = design.kind;
+    let input = format!("input:{}", kind.input_symbol());
+    let output = format!("output:{}", kind.outputs()[0]);
+    let plant = kind.plant_slot(e.dof);
+    let mut slots = vec![match e.law.place() {
+        Place::Input => input.clone(),
+        Place::Plant => plant.clone(),
+        Place::Parameter => format!("parameter:{}", kind.parameters()[e.theta]),
+        Place::Output => output.clone(),
+        Place::Disturbance => "disturbance".into(),
+    }];
+    let linear = !matches!(kind, Kind::Drive | Kind::ClosedDrive | Kind::Pendulum | Kind::Wing);
+    // Linear time-invariant blocks commute: before or after a linear plant is the same thing.
+    let commutes = matches!(
+        e.law,
+        Law::Delay | Law::ActuatorLag | Law::SensorLag | Law::LogCreep | Law::InputOffset | Law::OutputOffset
+    );
+    if linear && commutes && !kind.prescribed() {
+        slots.extend([input.clone(), output]);
+    }
+    if matches!(e.law, Law::InputOffset | Law::BackEmf) || (linear && e.law == Law::OutputOffset) {
+        slots.extend([input, plant]);
+    }
+    let mut unique: Vec<String> = Vec::new();
+    for s in slots {
+        if !unique.contains(&s) {
+            unique.push(s);
+        }
+    }
+    let same = match e.law {
+        // Dahl's law is Bouc and Wen's with gamma = 0 and n = 1.
+        Law::Dahl => vec![("bouc_wen", "hysteretic_spring")],
+        Law::SquareRootDamping => vec![("power_law_damping", "nonlinear_damping")],
+        Law::InputOffset if linear => vec![("output_offset", "bias")],
+        Law::OutputOffset if linear => vec![("input_offset", "bias")],
+        Law::ActuatorLag if linear => vec![("sensor_lag", "signal_path_lag")],
+        Law::SensorLag if linear => vec![("actuator_lag", "signal_path_lag")],
+        _ => Vec::new(),
+    };
+    Concealed {
+        mechanism: e.law.name(),
+        family: e.law.family(),
+        slots: unique,
+        same,
+        parameters: e.law.parameters().iter().copied().zip(e.p.iter().copied()).collect(),
+    }
+}
+
+/// The simulation file: what the user knows.
+fn simulation(design: &Design, declared: &[f64], regularised: Option<f64>, random: &mut Random) -> String {
+    let kind = design.kind;
+    let mut text = String::from("title = \"Simulation to be judged\"\n\n[time]\ncolumn = \"t_s\"\n");
+    if design.hold == Hold::Zero && !kind.prescribed() {
+        text.push_str("hold = \"zero\"\n");
+    }
+    text.push_str("\n[inputs]\n");
+    for (symbol, column) in kind.inputs() {
+        text.push_str(&format!("{symbol} = \"{column}\"\n"));
+    }
+    text.push_str("\n[parameters]\n");
+    for ((name, unit), value) in kind.parameters().iter().zip(kind.units()).zip(declared) {
+        let (low, high) = match (kind, *name) {
+            (Kind::Wing, "a_0") => (-6.0, 4.0),
+            (Kind::Specimen, "F0") => {
+                let size = design.theta[1] * design.level;
+                (-2.0 * size, 2.0 * size)
+            }
+            _ => (value * 0.1, value * 10.0),
+        };
+        text.push_str(&format!(
+            "{name} = {{ value = {value:.6e}, min = {low:.4e}, max = {high:.4e}, unit = \"{unit}\" }}\n"
+        ));
+    }
+    let speed = if matches!(kind, Kind::Drive | Kind::ClosedDrive | Kind::Pendulum) { "w" } else { "v" };
+    let friction = regularised.map_or_else(|| format!("sign({speed})"), |v| format!("tanh({speed}/{v:.6e})"));
+    let states = kind.states(&friction);
+    if !states.is_empty() {
+        let free = random.chance(0.3);
+        text.push_str("\n[states]\n");
+        for (symbol, derivative) in states {
+            let initial = if free { "\"free\"" } else { "0.0" };
+            text.push_str(&format!("{symbol} = {{ derivative = \"{derivative}\", initial = {initial} }}\n"));
+        }
+    }
+    text.push_str("\n[outputs]\n");
+    for (column, expression) in kind.outputs().iter().zip(kind.output_expressions()).take(design.channels) {
+        text.push_str(&format!("{column} = \"{expression}\"\n"));
+    }
+    text
+}
