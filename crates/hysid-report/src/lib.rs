@@ -6,6 +6,8 @@
 //!
 //! * [`figure`] draws lines, points, stems, bands and maps.
 //! * [`page`] puts sections, facts, tables and figures together.
+//! * [`diagnosis`] is the page of a diagnosis.
 
+pub mod diagnosis;
 pub mod figure;
 pub mod page;

@@ -1,0 +1,325 @@
+//! The report of a diagnosis: one page that an engineer shows to a colleague.
+//!
+//! Order of the page: the verdict in one sentence, the figures of merit, recording and simulations over time, the residual
+//! over frequency, where the mismatch lives, the law that was found, the candidates, the parameters, what the recording
+//! could not have shown, the proposed experiment, how to make the page again.
+
+mod figures;
+mod words;
+
+use hysid_diagnose::file::{DiagnosisFile, VerdictKind};
+use hysid_diagnose::picture::{ParameterPicture, Picture};
+
+use crate::page::{Align, Page, Table, Tenor};
+use words::{interval, number, percent, probability};
+
+/// How the page can be made again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Provenance {
+    /// The command line as typed.
+    pub command: String,
+    /// The program's version.
+    pub version: String,
+}
+
+/// How many of the smallest detectable effects are listed.
+const MOST_DETECTABLE: usize = 14;
+/// How many rivals are listed.
+const MOST_RIVALS: usize = 12;
+
+/// The page as HTML text.
+pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) -> String {
+    let mut page = Page::new(format!("Diagnosis: {}", picture.title), words::headline(file), file.summary.clone());
+    merit(&mut page, file);
+    page.notes(Tenor::Warning, &file.notes);
+    effects(&mut page, file);
+    time(&mut page, picture);
+    residual(&mut page, picture);
+    location(&mut page, file, picture);
+    laws(&mut page, picture);
+    candidates(&mut page, file);
+    correction(&mut page, file);
+    fits(&mut page, file);
+    parameters(&mut page, &picture.parameters);
+    limits(&mut page, file);
+    experiment(&mut page, file);
+    page.section(
+        "How to make this page again",
+        "The same recordings and the same seed give the same verdict, whatever the number of threads.",
+    );
+    page.code(&provenance.command);
+    page.foot(format!("hysid {}, seed {}, {}", provenance.version, file.seed, file.schema));
+    page.render()
+}
+
+fn merit(page: &mut Page, file: &DiagnosisFile) {
+    let mut facts = vec![(
+        file.mismatch.p_value.map_or_else(|| "not tested".into(), words::p_value),
+        "p-value: the chance of a mismatch score this large with nothing missing".to_string(),
+    )];
+    if let Some(first) = file.effects.first() {
+        facts.push((probability(first.probability), format!("probability of {}", words::plain(&first.mechanism))));
+        facts.push((
+            probability(first.family_probability),
+            format!("probability of the family {}", words::plain(&first.family)),
+        ));
+        if let Some(c) = first.concealment {
+            facts.push((percent(c), "of its response could be absorbed by wrong parameters".into()));
+        }
+    }
+    let best = file.fit.iter().filter_map(|f| f.ratio).fold(None, |m: Option<f64>, r| Some(m.map_or(r, |m| m.max(r))));
+    if let Some(ratio) = best.filter(|_| file.verdict != VerdictKind::NoSignificantMismatch) {
+        facts.push((number(ratio), "hold-out error after over before (the worst record)".into()));
+    }
+    if let Some(remaining) = &file.remaining {
+        facts.push((percent(remaining.share), "of the original mismatch remains".into()));
+    }
+    page.facts(&facts);
+}
+
+fn effects(page: &mut Page, file: &DiagnosisFile) {
+    if file.effects.is_empty() {
+        return;
+    }
+    let intro = match file.verdict {
+        VerdictKind::Named => "",
+        VerdictKind::Family => "The family is firm, the member is not; the likeliest member is shown.",
+        VerdictKind::Ambiguous => "Several families remain; the likeliest explanation is shown, its rivals are below.",
+        _ => "The catalogue's best explanation; it does not explain everything.",
+    };
+    page.section("What is missing", intro);
+    for effect in &file.effects {
+        page.text(&effect.sentence);
+        let mut table = Table::new(&[
+            ("parameter", Align::Left),
+            ("value", Align::Right),
+            ("95 % interval", Align::Right),
+            ("unit", Align::Left),
+        ]);
+        for p in &effect.parameters {
+            table.row([p.name.clone(), number(p.value), interval(p.low, p.high), p.unit.clone()]);
+        }
+        page.table(&table);
+    }
+}
+
+fn time(page: &mut Page, picture: &Picture) {
+    if picture.records.is_empty() {
+        return;
+    }
+    page.section(
+        "Recording and simulation over time",
+        "Both simulations run free: they see the input only. Before: the simulation with its parameters calibrated again. After: with the effect in it.",
+    );
+    for record in &picture.records {
+        let role = figures::role(record.role);
+        page.figure(figures::over_time(record), &format!("{}, {} ({role})", record.recording, record.output));
+        page.figure(
+            figures::residual_over_time(record),
+            &format!("Residual of {} before and after; dashed: two standard deviations of the noise", record.output),
+        );
+    }
+}
+
+fn residual(page: &mut Page, picture: &Picture) {
+    if picture.spectra.is_empty() {
+        return;
+    }
+    page.section(
+        "The residual over frequency",
+        "Where the residual stands above the noise floor, something is left out.",
+    );
+    for spectrum in &picture.spectra {
+        page.figure(figures::spectrum(spectrum), &format!("Amplitude spectra of {}", spectrum.output));
+    }
+}
+
+fn location(page: &mut Page, file: &DiagnosisFile, picture: &Picture) {
+    let Some(location) = &file.location else { return };
+    page.section("Where they part", "");
+    let list = |pairs: &[[f64; 2]], unit: &str| {
+        let parts: Vec<String> =
+            pairs.iter().map(|[a, b]| format!("{} to {} {unit}", number(*a), number(*b))).collect();
+        if parts.is_empty() { "throughout".to_string() } else { parts.join(", ") }
+    };
+    let mut table = Table::new(&[("", Align::Left), ("", Align::Left)]);
+    table.row(["place in the simulation".into(), location.slot.clone()]);
+    table.row(["block".into(), words::plain(&location.block)]);
+    table.row(["time".into(), list(&location.time_s, "s")]);
+    table.row(["frequency".into(), list(&location.band_hz, "Hz")]);
+    table.row(["operating region".into(), location.region.clone()]);
+    page.table(&table);
+    for map in &picture.maps {
+        let mut pair = vec![(
+            figures::map(map, &map.before),
+            format!("{}: mean residual before, in units of the noise", map.output),
+        )];
+        if let Some(after) = &map.after {
+            pair.push((figures::map(map, after), "The same after, in its own colours".into()));
+        }
+        page.figures(pair);
+    }
+}
+
+fn laws(page: &mut Page, picture: &Picture) {
+    if picture.laws.is_empty() {
+        return;
+    }
+    page.section("The law that was found", "As the augmented simulation runs through it on the recording.");
+    page.figures(picture.laws.iter().map(|law| (figures::law(law), law.title.clone())).collect());
+}
+
+fn candidates(page: &mut Page, file: &DiagnosisFile) {
+    if file.effects.is_empty() && file.alternatives.is_empty() {
+        return;
+    }
+    page.section(
+        "Candidates",
+        "Evidence: how much twice the log evidence falls short of the best. Separation: squared distance to the best one's response in units of the noise, after the rival's own refit; below 9 the two cannot be told apart on this recording.",
+    );
+    let mut table = Table::new(&[
+        ("mechanism", Align::Left),
+        ("family", Align::Left),
+        ("place", Align::Left),
+        ("probability", Align::Right),
+        ("evidence short by", Align::Right),
+        ("separation", Align::Right),
+        ("concealment", Align::Right),
+    ]);
+    for e in &file.effects {
+        let concealed = e.concealment.map(percent).unwrap_or_default();
+        let p = probability(e.probability);
+        table.row([
+            words::plain(&e.mechanism),
+            words::plain(&e.family),
+            e.slot.clone(),
+            p,
+            "0".into(),
+            String::new(),
+            concealed,
+        ]);
+    }
+    for a in file.alternatives.iter().take(MOST_RIVALS) {
+        table.row([
+            words::plain(&a.mechanism),
+            words::plain(&a.family),
+            a.slot.clone(),
+            probability(a.probability),
+            number(a.evidence_gap),
+            a.separation.map(number).unwrap_or_default(),
+            String::new(),
+        ]);
+    }
+    page.table(&table);
+}
+
+fn correction(page: &mut Page, file: &DiagnosisFile) {
+    let Some(correction) = &file.correction else { return };
+    let s = &correction.signature;
+    page.section(
+        "A correction without a name",
+        "A sparse model of what no mechanism of the catalogue explains. It improves the prediction; it is not physics.",
+    );
+    let rate = if s.rate_dependent { "depends on the rate" } else { "does not depend on the rate" };
+    page.text(&format!("Memory: {}; {rate}; symmetry: {}; side: {}.", words::plain(&s.memory), s.symmetry, s.side));
+    let mut table = Table::new(&[("term", Align::Left), ("coefficient", Align::Right), ("ERR", Align::Right)]);
+    for t in &correction.terms {
+        table.row([t.term.clone(), number(t.coefficient), percent(t.err)]);
+    }
+    page.table(&table);
+}
+
+fn fits(page: &mut Page, file: &DiagnosisFile) {
+    if file.fit.is_empty() {
+        return;
+    }
+    page.section(
+        "Free-run error on recordings that were never used",
+        "Before is the calibrated simulation, never the first guess.",
+    );
+    let mut table = Table::new(&[
+        ("recording", Align::Left),
+        ("output", Align::Left),
+        ("before", Align::Right),
+        ("after", Align::Right),
+        ("after / before", Align::Right),
+        ("95 % interval", Align::Right),
+        ("black box", Align::Right),
+    ]);
+    let some = |v: Option<f64>| v.map(number).unwrap_or_default();
+    for f in &file.fit {
+        table.row([
+            f.recording.clone(),
+            f.output.clone(),
+            some(f.rmse_before),
+            some(f.rmse_after),
+            some(f.ratio),
+            interval(f.ratio_low, f.ratio_high),
+            some(f.rmse_black_box),
+        ]);
+    }
+    page.table(&table);
+}
+
+fn parameters(page: &mut Page, parameters: &[ParameterPicture]) {
+    if parameters.is_empty() {
+        return;
+    }
+    page.section("Parameters", "A parameter that moves far when the effect is put in had been absorbing it.");
+    let mut table = Table::new(&[
+        ("parameter", Align::Left),
+        ("given", Align::Right),
+        ("before", Align::Right),
+        ("95 % interval", Align::Right),
+        ("after", Align::Right),
+        ("95 % interval", Align::Right),
+        ("unit", Align::Left),
+        ("remark", Align::Left),
+    ]);
+    let value = |v: Option<[f64; 3]>| v.map(|v| number(v[0])).unwrap_or_default();
+    let range = |v: Option<[f64; 3]>| v.map(|v| interval(Some(v[1]), Some(v[2]))).unwrap_or_default();
+    for p in parameters {
+        let given = p.given.map(number).unwrap_or_default();
+        let cells = [p.name.clone(), given, value(p.before), range(p.before), value(p.after), range(p.after)];
+        table.row(cells.into_iter().chain([p.unit.clone(), p.remark.clone()]));
+    }
+    page.table(&table);
+}
+
+fn limits(page: &mut Page, file: &DiagnosisFile) {
+    if file.mismatch.detectable.is_empty() {
+        return;
+    }
+    page.section(
+        "What the recording would have shown",
+        "The smallest strength of each effect that would have been seen here. Below it, this recording cannot say.",
+    );
+    let mut table = Table::new(&[
+        ("mechanism", Align::Left),
+        ("place", Align::Left),
+        ("smallest", Align::Right),
+        ("unit", Align::Left),
+    ]);
+    for d in file.mismatch.detectable.iter().take(MOST_DETECTABLE) {
+        table.row([words::plain(&d.mechanism), d.slot.clone(), number(d.smallest), d.unit.clone()]);
+    }
+    page.table(&table);
+    let more = file.mismatch.detectable.len().saturating_sub(MOST_DETECTABLE);
+    if more > 0 {
+        page.text(&format!("{more} more are in diagnosis.json."));
+    }
+}
+
+fn experiment(page: &mut Page, file: &DiagnosisFile) {
+    let Some(experiment) = &file.experiment else { return };
+    page.section("The experiment that would decide", "");
+    page.text(&experiment.sentence);
+    if let (Some(expected), Some(present)) = (experiment.expected_separation, experiment.present_separation) {
+        let text = format!(
+            "Separation expected: {} (25 settles it); on this recording: {}.",
+            number(expected),
+            number(present)
+        );
+        page.text(&text);
+    }
+}

@@ -1,0 +1,108 @@
+//! The page of a diagnosis holds what the verdict says, for every kind of verdict.
+
+use std::collections::BTreeMap;
+
+use hysid_diagnose::file::*;
+use hysid_diagnose::picture::{MapPicture, Picture, RecordPicture, Role};
+use hysid_report::diagnosis::{Provenance, page};
+
+fn file(verdict: VerdictKind) -> DiagnosisFile {
+    let named = verdict != VerdictKind::NoSignificantMismatch;
+    let effect = EffectRecord {
+        mechanism: "coulomb_friction".into(),
+        family: "dry_friction".into(),
+        slot: "state:v".into(),
+        probability: 0.97,
+        family_probability: 0.99,
+        concealment: Some(0.93),
+        sentence: "Dry friction of about 20 N opposes the motion.".into(),
+        parameters: vec![ParameterRecord {
+            name: "F_c".into(),
+            value: 20.3,
+            low: Some(19.8),
+            high: Some(20.9),
+            unit: "N".into(),
+        }],
+    };
+    DiagnosisFile {
+        schema: SCHEMA.into(),
+        verdict,
+        summary: "What the verdict rests on.".into(),
+        mismatch: MismatchRecord {
+            p_value: Some(0.005),
+            residual_rms: BTreeMap::new(),
+            noise_rms: BTreeMap::new(),
+            detectable: vec![DetectableRecord {
+                mechanism: "cubic_stiffness".into(),
+                slot: "state:v".into(),
+                smallest: 0.12,
+                unit: "N/m^3".into(),
+            }],
+        },
+        location: named.then(|| LocationRecord {
+            slot: "state:v".into(),
+            block: "damping".into(),
+            time_s: vec![[0.0, 12.4]],
+            band_hz: vec![],
+            region: "near velocity reversals".into(),
+        }),
+        effects: if named { vec![effect] } else { vec![] },
+        alternatives: vec![],
+        fit: vec![],
+        remaining: None,
+        correction: None,
+        experiment: None,
+        calibrated_parameters: vec![],
+        notes: vec!["The recording has 2 gaps.".into()],
+        seed: 7,
+    }
+}
+
+fn picture() -> Picture {
+    Picture {
+        title: "Servo <axis>".into(),
+        records: vec![RecordPicture {
+            recording: "val.csv".into(),
+            output: "q_m".into(),
+            unit: "m".into(),
+            role: Role::HoldOut,
+            time_s: vec![0.0, 0.1, 0.2],
+            measured: vec![0.0, 1.0, f64::NAN],
+            before: vec![0.1, 0.8, 0.5],
+            after: Some(vec![0.0, 1.01, 0.4]),
+            noise_rms: 0.01,
+            held_out_s: vec![],
+        }],
+        maps: vec![MapPicture {
+            output: "q_m".into(),
+            x_label: "x (m)".into(),
+            y_label: "v (m/s)".into(),
+            x_edges: vec![0.0, 1.0],
+            y_edges: vec![0.0, 1.0],
+            before: vec![3.0],
+            after: None,
+        }],
+        ..Picture::default()
+    }
+}
+
+#[test]
+fn every_verdict_has_its_headline() {
+    let cases = [
+        (VerdictKind::NoSignificantMismatch, "No significant mismatch"),
+        (VerdictKind::Named, "Missing: coulomb friction"),
+        (VerdictKind::Family, "family dry friction"),
+        (VerdictKind::Ambiguous, "cannot tell what"),
+        (VerdictKind::NotInCatalogue, "the catalogue does not hold"),
+    ];
+    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
+    for (verdict, expected) in cases {
+        let html = page(&file(verdict), &picture(), &provenance);
+        for part in
+            [expected, "Servo &lt;axis&gt;", "hold-out, never used", "seed 7", "The recording has 2 gaps.", "0.12"]
+        {
+            assert!(html.contains(part), "{verdict:?}: the page does not say `{part}`");
+        }
+        assert_eq!(html.contains("19.8 to 20.9"), verdict != VerdictKind::NoSignificantMismatch);
+    }
+}
