@@ -14,14 +14,20 @@
 
 mod differential;
 mod error;
+mod maxwell_slip;
 mod operator;
 mod play;
+mod prandtl_ishlinskii;
+pub mod preisach;
 mod relay;
 mod stop;
 
 pub use differential::{Differential, Sampled, SampledState, rk4};
 pub use error::ParameterError;
+pub use maxwell_slip::{MaxwellSlip, SlipElement};
 pub use operator::{DynOperator, Operator, Running};
 pub use play::{Play, play};
+pub use prandtl_ishlinskii::{PrandtlIshlinskii, WeightedPlay};
+pub use preisach::{PreisachGrid, PreisachPlane, PreisachStaircase};
 pub use relay::{Relay, RelayState, relay};
 pub use stop::Stop;
