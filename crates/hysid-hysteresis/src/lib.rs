@@ -12,22 +12,38 @@
 //! # Ok::<(), hysid_hysteresis::ParameterError>(())
 //! ```
 
+mod baber_noori;
+mod bouc_wen;
+mod dahl;
 mod differential;
+mod duhem;
 mod error;
+mod goman_khrabrov;
+mod jiles_atherton;
+mod lugre;
 mod maxwell_slip;
 mod operator;
 mod play;
 mod prandtl_ishlinskii;
 pub mod preisach;
+mod reduced_frequency;
 mod relay;
 mod stop;
 
+pub use baber_noori::{BaberNoori, Degradation, Pinching};
+pub use bouc_wen::{BoucWen, BoucWenParameters};
+pub use dahl::Dahl;
 pub use differential::{Differential, Sampled, SampledState, rk4};
+pub use duhem::{Duhem, DuhemParameters};
 pub use error::ParameterError;
+pub use goman_khrabrov::{GomanKhrabrov, GomanKhrabrovParameters};
+pub use jiles_atherton::{JilesAtherton, JilesAthertonParameters};
+pub use lugre::{LuGre, LuGreParameters};
 pub use maxwell_slip::{MaxwellSlip, SlipElement};
 pub use operator::{DynOperator, Operator, Running};
 pub use play::{Play, play};
 pub use prandtl_ishlinskii::{PrandtlIshlinskii, WeightedPlay};
 pub use preisach::{PreisachGrid, PreisachPlane, PreisachStaircase};
+pub use reduced_frequency::{ReducedFrequency, ReducedFrequencyParameters, Wing};
 pub use relay::{Relay, RelayState, relay};
 pub use stop::Stop;
