@@ -112,14 +112,15 @@ impl Spec {
     /// The same with these lags of a signal added.
     #[must_use]
     pub fn lags(mut self, signal: Signal, lags: impl IntoIterator<Item = usize>) -> Self {
-        self.factors.extend(lags.into_iter().map(|l| Factor::value(signal, l)));
+        // One lag beyond the limit is enough to be refused.
+        self.factors.extend(lags.into_iter().take(LARGEST_LAG + 2).map(|l| Factor::value(signal, l)));
         self
     }
 
     /// The same with the hysteresis factors of a signal added at these lags: its difference and the sign of it.
     #[must_use]
     pub fn hysteresis(mut self, signal: Signal, lags: impl IntoIterator<Item = usize>) -> Self {
-        for lag in lags {
+        for lag in lags.into_iter().take(LARGEST_LAG + 2) {
             self.factors.extend([Factor::difference(signal, lag), Factor::sign(signal, lag)]);
         }
         self
@@ -128,7 +129,7 @@ impl Spec {
     /// The same with the sign of a signal's difference added at these lags.
     #[must_use]
     pub fn signs(mut self, signal: Signal, lags: impl IntoIterator<Item = usize>) -> Self {
-        self.factors.extend(lags.into_iter().map(|l| Factor::sign(signal, l)));
+        self.factors.extend(lags.into_iter().take(LARGEST_LAG + 2).map(|l| Factor::sign(signal, l)));
         self
     }
 

@@ -1,16 +1,12 @@
-//! Orthogonal forward regression on inner products: a pivoted Cholesky factorisation that grows a row at a time.
+//! Orthogonal forward regression on inner products: a pivoted Cholesky factorisation that grows and shrinks a row at a time.
 //!
 //! With the chosen columns taken out, candidate j has the energy S_j and the inner product c_j with what is left of the
-//! target; its error reduction ratio is c_j^2 / S_j. Choosing a column subtracts its row of the factor from both.
+//! target; its error reduction ratio is c_j^2 / S_j. Choosing a column subtracts its row of the factor from both; giving
+//! one back rotates its direction into the last row (Givens) and adds that row again.
 
 use hysid_linalg::Columns;
 
-use crate::criterion::{Facts, choose, value};
 use crate::moments::Moments;
-use crate::refit::refit;
-use crate::{
-    Criterion, CurvePoint, Options, Precision, Rejected, RejectedReason, SelectError, Selection, Step, StopReason,
-};
 
 /// An inner product of unit vectors below this is rounding.
 pub(crate) const NOISE: f64 = 64.0 * f64::EPSILON;
@@ -18,11 +14,10 @@ pub(crate) const NOISE: f64 = 64.0 * f64::EPSILON;
 /// The factor so far, and what is left of every candidate.
 #[derive(Clone)]
 pub(crate) struct Factor {
+    /// The chosen columns, in order.
     pub chosen: Vec<usize>,
-    /// Error reduction ratio of each chosen column.
-    pub err: Vec<f64>,
-    /// Energy of each chosen column when it was chosen.
-    pub pivot: Vec<f64>,
+    /// Inner product of each chosen column's new direction with the target.
+    pub gain: Vec<f64>,
     /// Row i of the factor, for all candidates.
     rows: Vec<Vec<f64>>,
     /// Energy left of each candidate.
@@ -31,17 +26,52 @@ pub(crate) struct Factor {
     pub cross: Vec<f64>,
 }
 
+/// A chosen column seen from the others: what its own direction (orthogonal to all others chosen) holds.
+pub(crate) struct Member {
+    /// Energy that the target would have left in addition without it.
+    pub worth: f64,
+    /// Its direction, as a combination of the factor's rows.
+    direction: Vec<f64>,
+}
+
 impl Factor {
     pub fn new<C: Columns + ?Sized>(moments: &Moments<'_, C>) -> Self {
         let energy = (0..moments.len()).map(|j| if moments.is_zero(j) { 0.0 } else { 1.0 }).collect();
         let cross = moments.cross.clone();
-        Self { chosen: Vec::new(), err: Vec::new(), pivot: Vec::new(), rows: Vec::new(), energy, cross }
+        Self { chosen: Vec::new(), gain: Vec::new(), rows: Vec::new(), energy, cross }
+    }
+
+    /// The factor of these columns in this order, leaving out what the guard does not let in.
+    pub fn of<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, columns: &[usize], guard: f64) -> Self {
+        let mut factor = Self::new(moments);
+        for (i, &j) in columns.iter().enumerate() {
+            if factor.energy[j] > guard {
+                moments.make(j, columns[i..].iter().copied());
+                factor.add(j, moments.column(j));
+            }
+        }
+        factor
+    }
+
+    /// Error reduction ratio of the chosen column of this place.
+    pub fn err(&self, place: usize) -> f64 {
+        self.gain[place] * self.gain[place]
+    }
+
+    /// Energy that the chosen column of this place had left when it was chosen.
+    pub fn pivot(&self, place: usize) -> f64 {
+        let diagonal = self.rows[place][self.chosen[place]];
+        diagonal * diagonal
+    }
+
+    /// What is left of the target's energy.
+    pub fn sse(&self) -> f64 {
+        1.0 - self.gain.iter().map(|g| g * g).sum::<f64>()
     }
 
     /// The error reduction ratio that candidate `j` would have; `None` if it may not be chosen.
     pub fn score(&self, j: usize, guard: f64) -> Option<f64> {
-        let (s, c) = (self.energy[j], self.cross[j]);
-        (s > guard && c.abs() > NOISE).then(|| c * c / s)
+        score(self.energy[j], self.cross[j], guard)
     }
 
     /// The candidates with the largest scores, best first, ties by number.
@@ -66,139 +96,109 @@ impl Factor {
                 *r -= a * b;
             }
         }
-        let pivot = self.energy[j];
-        let inverse = 1.0 / pivot.sqrt();
-        let g = self.cross[j] * inverse;
+        let diagonal = self.energy[j].sqrt();
+        let inverse = 1.0 / diagonal;
+        let gain = self.cross[j] * inverse;
         for ((r, s), c) in row.iter_mut().zip(&mut self.energy).zip(&mut self.cross) {
             *r *= inverse;
             *s -= *r * *r;
-            *c -= *r * g;
+            *c -= *r * gain;
         }
-        // A chosen column has nothing left, exactly.
-        self.energy[j] = 0.0;
-        self.cross[j] = 0.0;
+        // What the algebra makes zero is zero: a chosen column has nothing left, and the factor is triangular.
+        for &k in &self.chosen {
+            row[k] = 0.0;
+        }
+        row[j] = diagonal;
         self.rows.push(row);
         self.chosen.push(j);
-        self.err.push(g * g);
-        self.pivot.push(pivot);
+        self.gain.push(gain);
+        self.clear_chosen();
     }
-}
 
-/// How many terms a search must look at.
-pub(crate) fn longest(options: &Options, rows: usize, cols: usize) -> usize {
-    let wanted = match options.criterion {
-        Criterion::Terms(n) => n,
-        _ => options.max_terms,
-    };
-    wanted.min(cols).min(rows.saturating_sub(1).max(1))
-}
+    /// Gives back the chosen column of this place.
+    pub fn remove(&mut self, place: usize) {
+        let removed = self.chosen.remove(place);
+        let last = self.rows.len() - 1;
+        for p in place..last {
+            let c = self.chosen[p];
+            let (head, tail) = self.rows.split_at_mut(p + 1);
+            let (upper, lower) = (&mut head[p], &mut tail[0]);
+            let (a, b) = (upper[c], lower[c]);
+            let r = a.hypot(b);
+            let (cs, sn) = (a / r, b / r);
+            for (u, l) in upper.iter_mut().zip(lower.iter_mut()) {
+                (*u, *l) = (cs * *u + sn * *l, cs * *l - sn * *u);
+            }
+            (upper[c], lower[c]) = (r, 0.0);
+            let (gu, gl) = (self.gain[p], self.gain[p + 1]);
+            (self.gain[p], self.gain[p + 1]) = (cs * gu + sn * gl, cs * gl - sn * gu);
+        }
+        if let (Some(row), Some(gain)) = (self.rows.pop(), self.gain.pop()) {
+            for ((r, s), c) in row.iter().zip(&mut self.energy).zip(&mut self.cross) {
+                *s += r * r;
+                *c += r * gain;
+            }
+            self.energy[removed] = row[removed] * row[removed];
+            self.cross[removed] = row[removed] * gain;
+        }
+        self.clear_chosen();
+    }
 
-pub(crate) fn greedy<C: Columns + ?Sized>(phi: &C, y: &[f64], options: &Options) -> Result<Selection, SelectError> {
-    let mut moments = Moments::new(phi, y)?;
-    let longest = longest(options, phi.rows(), phi.cols());
-    let mut factor = Factor::new(&moments);
-    let mut rejected: Vec<Rejected> = (0..moments.len())
-        .filter(|j| moments.is_zero(*j))
-        .map(|column| Rejected { column, at_step: 0, reason: RejectedReason::Zero })
-        .collect();
-    let mut ran_out = None;
-    while factor.chosen.len() < longest {
-        let step = factor.chosen.len();
-        let ranked = factor.best(8, options.pivot_guard);
-        let next = match options.forced.get(step) {
-            Some(&j) if factor.energy[j] > options.pivot_guard => j,
-            _ => match ranked.first() {
-                Some(&j) => j,
-                None => {
-                    let spare = (0..moments.len()).any(|j| factor.energy[j] > options.pivot_guard);
-                    ran_out = Some(if spare { StopReason::ResidualExhausted } else { StopReason::NoCandidateLeft });
-                    break;
+    fn clear_chosen(&mut self) {
+        for &k in &self.chosen {
+            (self.energy[k], self.cross[k]) = (0.0, 0.0);
+        }
+    }
+
+    /// Every chosen column seen from the others.
+    ///
+    /// The direction of column i that is orthogonal to the others is the i-th row of the factor's inverse, in terms of the
+    /// factor's rows.
+    pub fn members(&self) -> Vec<Member> {
+        let n = self.chosen.len();
+        (0..n)
+            .map(|i| {
+                // T' v = e_i by forward substitution; v is zero before place i.
+                let mut v = vec![0.0; n];
+                for b in i..n {
+                    let known: f64 = (i..b).map(|a| self.rows[a][self.chosen[b]] * v[a]).sum();
+                    v[b] = (f64::from(u8::from(b == i)) - known) / self.rows[b][self.chosen[b]];
                 }
-            },
-        };
-        moments.make(next, ranked.iter().copied());
-        factor.add(next, moments.column(next));
-        for column in 0..moments.len() {
-            let left = factor.energy[column];
-            let known = factor.chosen.contains(&column) || rejected.iter().any(|r| r.column == column);
-            if left <= options.pivot_guard && !known {
-                let reason = RejectedReason::NearSingular(left.max(0.0));
-                rejected.push(Rejected { column, at_step: step + 1, reason });
-            }
-        }
-        if let Criterion::ErrTolerance(rho) = options.criterion {
-            if 1.0 - factor.err.iter().sum::<f64>() <= rho {
-                break;
-            }
-        }
+                let norm = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+                v.iter_mut().for_each(|x| *x /= norm);
+                let gain: f64 = v.iter().zip(&self.gain).map(|(x, g)| x * g).sum();
+                Member { worth: gain * gain, direction: v }
+            })
+            .collect()
     }
-    Ok(finish_path(phi, y, options, &moments, &factor, rejected, ran_out))
+
+    /// The candidate that would best take the place of a member, and the energy it would explain; ties by number.
+    pub fn best_replacement(&self, place: usize, member: &Member, guard: f64) -> Option<(usize, f64)> {
+        let removed = self.chosen[place];
+        let mut back = vec![0.0; self.energy.len()];
+        let mut gain = 0.0;
+        for ((row, v), g) in self.rows.iter().zip(&member.direction).zip(&self.gain).skip(place) {
+            gain += v * g;
+            for (b, r) in back.iter_mut().zip(row) {
+                *b += v * r;
+            }
+        }
+        let mut best: Option<(usize, f64)> = None;
+        for (j, b) in back.iter().enumerate() {
+            // A chosen column has no energy left and none along a direction orthogonal to it, but for the removed one.
+            if j == removed || self.energy[j] <= 0.0 {
+                continue;
+            }
+            if let Some(s) = score(self.energy[j] + b * b, self.cross[j] + b * gain, guard) {
+                if best.is_none_or(|(_, t)| s > t) {
+                    best = Some((j, s));
+                }
+            }
+        }
+        best
+    }
 }
 
-/// Refits the path, chooses its length by the criterion and writes the result.
-fn finish_path<C: Columns + ?Sized>(
-    phi: &C,
-    y: &[f64],
-    options: &Options,
-    moments: &Moments<'_, C>,
-    factor: &Factor,
-    rejected: Vec<Rejected>,
-    ran_out: Option<StopReason>,
-) -> Selection {
-    let (samples, energy) = (phi.rows(), moments.target_energy);
-    let path = &factor.chosen;
-    let whole = refit(phi, y, path, energy);
-    let values: Vec<f64> = (0..path.len())
-        .map(|k| {
-            let facts = Facts { terms: k + 1, samples, sse: whole.sse[k], press: whole.press[k], blocks: f64::NAN };
-            value(&options.criterion, facts)
-        })
-        .collect();
-    let size = choose(&options.criterion, &values, &whole.sse);
-    let stop = match options.criterion {
-        Criterion::Terms(n) if size == n => StopReason::GoalReached,
-        Criterion::ErrTolerance(rho) if size > 0 && whole.sse[size - 1] <= rho => StopReason::GoalReached,
-        _ if size < path.len() => StopReason::CriterionMinimum,
-        _ => ran_out.unwrap_or(StopReason::MaxTerms),
-    };
-    let terms = path[..size].to_vec();
-    let fit = refit(phi, y, &terms, energy).fit;
-    let deviation = |k: usize| {
-        let (a, b) = (factor.err[k], whole.err[k]);
-        if a.max(b) > 0.0 { (a - b).abs() / a.max(b) } else { 0.0 }
-    };
-    let steps = (0..size)
-        .map(|k| Step {
-            column: path[k],
-            err: whole.err[k],
-            criterion: values[k],
-            sse: whole.sse[k],
-            press: whole.press[k],
-            condition: whole.condition[k],
-        })
-        .collect();
-    let curve = (0..path.len())
-        .map(|k| CurvePoint {
-            columns: path[..=k].to_vec(),
-            criterion: values[k],
-            sse: whole.sse[k],
-            press: whole.press[k],
-        })
-        .collect();
-    Selection {
-        theta: fit.theta,
-        unscaled_variance: fit.unscaled_variance,
-        steps,
-        curve,
-        stop,
-        rejected,
-        precision: Precision {
-            err_deviation: (0..size).map(deviation).fold(0.0, f64::max),
-            smallest_pivot: factor.pivot[..size].iter().copied().fold(1.0, f64::min),
-            doubtful_from: (0..size).find(|&k| deviation(k) > 1e-3),
-        },
-        terms,
-        target_energy: energy,
-        samples,
-    }
+fn score(energy: f64, cross: f64, guard: f64) -> Option<f64> {
+    (energy > guard && cross.abs() > NOISE).then(|| cross * cross / energy)
 }

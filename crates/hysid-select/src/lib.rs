@@ -35,11 +35,15 @@
 //! forward regression and the PRESS statistic"; Zhang, Zhu, Gu (2017), whose equations are cited by their numbers.
 
 mod criterion;
+mod finish;
 mod forward;
 mod moments;
 mod options;
+mod pursuit;
 mod refit;
+mod rescore;
 mod result;
+mod search;
 
 pub use options::{Criterion, Options, PressForm, Search, SelectError};
 pub use result::{CurvePoint, Precision, Rejected, RejectedReason, Selection, Step, StopReason};
@@ -52,5 +56,14 @@ use hysid_linalg::Columns;
 /// A target of another length than `phi` has rows, or all zero, or not finite; options out of range.
 pub fn select<C: Columns + ?Sized>(phi: &C, y: &[f64], options: &Options) -> Result<Selection, SelectError> {
     options.check(phi.rows(), phi.cols(), y)?;
-    forward::greedy(phi, y, options)
+    let mut moments = moments::Moments::new(phi, y)?;
+    let table = match options.search {
+        Search::MatchingPursuit => {
+            // A pursuit does not solve for its coefficients, so it may take more terms than there are samples.
+            let longest = options::longest(options, usize::MAX, phi.cols());
+            search::Table::of_pursuit(pursuit::pursue(&mut moments, &options.forced, longest), longest)
+        }
+        _ => search::search(phi, y, &mut moments, options),
+    };
+    Ok(finish::finish(phi, y, options, &mut moments, table))
 }

@@ -12,6 +12,22 @@ pub enum Search {
     /// Classical orthogonal forward regression: every candidate is orthogonalised against the columns chosen so far, and
     /// the one with the largest error reduction ratio is taken.
     Greedy,
+    /// Greedy, and again from each of the `starts` best single columns as the first (iterative OFR); for each number of
+    /// terms the best of these paths counts.
+    Iterative {
+        /// How many first columns are tried.
+        starts: usize,
+    },
+    /// The `width` best subsets of each size are kept and grown; then the moves of [`Search::Floating`].
+    Beam {
+        /// How many subsets are kept.
+        width: usize,
+    },
+    /// The default. A greedy path that goes [`Options::patience`] terms beyond the criterion's minimum; then, for every
+    /// number of terms at once, moves of one term: exchange one, take the best further one, give back the one that is missed
+    /// least, until the best subset of no size can be bettered by a move. A term that the greedy path took too early
+    /// is given back that way, and where the path contains all terms of an exact model, exactly these remain.
+    Floating,
 }
 
 /// The form of the leave-one-out criterion.
@@ -58,16 +74,19 @@ pub struct Options {
     /// A candidate of which less than this part of its energy is left beside the chosen columns is passed over and
     /// reported.
     pub pivot_guard: f64,
+    /// How many terms a path goes on beyond the criterion's minimum before it is believed.
+    pub patience: usize,
 }
 
 impl Default for Options {
     fn default() -> Self {
         Self {
-            search: Search::Greedy,
+            search: Search::Floating,
             criterion: Criterion::Press(PressForm::Exact),
             max_terms: 30,
             forced: Vec::new(),
             pivot_guard: 1e-11,
+            patience: 8,
         }
     }
 }
@@ -110,7 +129,27 @@ pub enum SelectError {
     },
 }
 
+impl Criterion {
+    /// Whether it has a minimum to stop at.
+    pub(crate) fn has_minimum(&self) -> bool {
+        !matches!(self, Self::Terms(_) | Self::ErrTolerance(_))
+    }
+}
+
+/// How many terms a search must look at.
+pub(crate) fn longest(options: &Options, rows: usize, cols: usize) -> usize {
+    options.max_terms_allowed().max(options.forced.len()).min(cols).min(rows.saturating_sub(1).max(1))
+}
+
 impl Options {
+    /// The largest number of terms that may be chosen.
+    pub(crate) fn max_terms_allowed(&self) -> usize {
+        match self.criterion {
+            Criterion::Terms(n) => n,
+            _ => self.max_terms,
+        }
+    }
+
     pub(crate) fn check(&self, rows: usize, cols: usize, y: &[f64]) -> Result<(), SelectError> {
         if y.len() != rows {
             return Err(SelectError::Shape { rows, found: y.len() });
@@ -131,6 +170,11 @@ impl Options {
         }
         if !(self.pivot_guard >= 0.0 && self.pivot_guard < 1.0) {
             return option("pivot_guard", self.pivot_guard.to_string(), "0 up to 1");
+        }
+        match self.search {
+            Search::Iterative { starts: 0 } => return option("search", "0 starts".into(), "1 or more"),
+            Search::Beam { width: 0 } => return option("search", "a beam of width 0".into(), "1 or more"),
+            _ => {}
         }
         for (i, j) in self.forced.iter().enumerate() {
             if *j >= cols || self.forced[..i].contains(j) {

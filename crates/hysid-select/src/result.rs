@@ -29,6 +29,9 @@ pub struct CurvePoint {
     pub sse: f64,
     /// Exact leave-one-out sum of squares relative to y'y.
     pub press: f64,
+    /// What the search itself left unexplained, relative to y'y: for matching pursuit the residual of the pursuit, which is
+    /// larger than the least-squares residual `sse`; otherwise the same but for rounding.
+    pub search_sse: f64,
 }
 
 /// Why there are not more terms.

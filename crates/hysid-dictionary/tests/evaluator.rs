@@ -1,0 +1,114 @@
+//! One evaluator: the design matrix, the one-step prediction and the free run agree on every term.
+
+use hysid_dictionary::{Design, Dictionary, Factor, Model, Quantity, Record, Signal, Signals, Term};
+use hysid_linalg::Columns;
+use proptest::prelude::*;
+
+fn signals() -> Signals {
+    Signals::from_columns("y", &["a", "b"]).unwrap().with_threshold(Signal::Input(0), 0.2)
+}
+
+fn factor() -> impl Strategy<Value = Factor> {
+    let signal = prop_oneof![Just(Signal::Output), Just(Signal::Input(0)), Just(Signal::Input(1))];
+    (signal, 0usize..3, 0usize..4).prop_map(|(s, kind, lag)| {
+        let lag = if s == Signal::Output { lag + 1 } else { lag };
+        Factor { quantity: [Quantity::Value(s), Quantity::Difference(s), Quantity::Sign(s)][kind], lag }
+    })
+}
+
+fn terms() -> impl Strategy<Value = Vec<Term>> {
+    prop::collection::vec(prop::collection::vec(factor(), 0..5).prop_map(Term::new), 1..8).prop_map(|mut t| {
+        t.sort();
+        t.dedup();
+        t
+    })
+}
+
+fn samples(n: usize) -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec(-1.0..1.0f64, n)
+}
+
+/// The value of a factor by its definition, on a record without gaps.
+fn by_definition(f: Factor, n: usize, y: &[f64], inputs: [&[f64]; 2]) -> f64 {
+    let at = n - f.lag;
+    let (x, threshold) = match f.quantity.signal() {
+        Signal::Output => (y, 0.0),
+        Signal::Input(0) => (inputs[0], 0.2),
+        Signal::Input(_) => (inputs[1], 0.0),
+    };
+    match f.quantity {
+        Quantity::Value(_) => x[at],
+        Quantity::Difference(_) => x[at] - x[at - 1],
+        Quantity::Sign(_) => {
+            (1..=at).rev().map(|m| x[m] - x[m - 1]).find(|d| d.abs() > threshold).map_or(1.0, f64::signum)
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn columns_are_products_of_factors(terms in terms(), y in samples(40), a in samples(40), b in samples(40)) {
+        let dictionary = Dictionary::from_terms(signals(), terms).unwrap();
+        let design = Design::new(&dictionary, &[Record::new(&y, vec![&a, &b])]).unwrap();
+        let rows: Vec<usize> = design.samples().map(|(_, n)| n).collect();
+        prop_assert_eq!(rows.len(), 40 - dictionary.reach());
+        let mut column = vec![0.0; rows.len()];
+        for (j, term) in dictionary.terms().iter().enumerate() {
+            design.fill(j, 0..rows.len(), &mut column);
+            for (&n, &c) in rows.iter().zip(&column) {
+                prop_assert_eq!(c, term.evaluate(|f| by_definition(f, n, &y, [&a, &b])));
+            }
+        }
+    }
+
+    #[test]
+    fn a_free_run_is_a_chain_of_one_step_predictions(
+        terms in terms(), theta in prop::collection::vec(-0.3..0.3f64, 8), start in samples(6), a in samples(60), b in samples(60),
+    ) {
+        let theta = theta[..terms.len()].to_vec();
+        let model = Model::new(signals(), terms, theta).unwrap();
+        let run = model.free_run(&[&a, &b], &start, 60, 1e3).unwrap();
+        let end = run.diverged_at.unwrap_or(60);
+        prop_assert_eq!(&run.y[..6.min(end)], &start[..6.min(end)]);
+        // Fed with its own output, one step ahead gives the same output again.
+        let (y, a, b) = (&run.y[..end], &a[..end], &b[..end]);
+        let again = model.one_step(&Record::new(y, vec![a, b])).unwrap();
+        for n in 6..end {
+            prop_assert!((again[n] - y[n]).abs() <= 1e-13 * (1.0 + y[n].abs()), "{}: {} {}", n, again[n], y[n]);
+        }
+    }
+
+    #[test]
+    fn gaps_cut_a_record_as_separate_records_do(terms in terms(), y in samples(60), a in samples(60), b in samples(60), gap in 10usize..50) {
+        let dictionary = Dictionary::from_terms(signals(), terms).unwrap();
+        let mut holed = y.clone();
+        holed[gap] = f64::NAN;
+        let one = Design::new(&dictionary, &[Record::new(&holed, vec![&a, &b])]).unwrap();
+        let two = Design::new(&dictionary, &[
+            Record::new(&y[..gap], vec![&a[..gap], &b[..gap]]),
+            Record::new(&y[gap + 1..], vec![&a[gap + 1..], &b[gap + 1..]]),
+        ]).unwrap();
+        prop_assert_eq!(one.target(), two.target());
+        let rows = one.rows();
+        prop_assert_eq!(rows, two.rows());
+        let (mut left, mut right) = (vec![0.0; rows], vec![0.0; rows]);
+        for j in 0..dictionary.len() {
+            one.fill(j, 0..rows, &mut left);
+            two.fill(j, 0..rows, &mut right);
+            prop_assert_eq!(&left, &right);
+        }
+    }
+}
+
+#[test]
+fn divergence_is_a_result() {
+    let model = Model::new(Signals::siso(), vec![Signals::siso().parse("y[n-1]^2").unwrap()], vec![1.0]).unwrap();
+    let u = [0.0; 50];
+    let run = model.free_run(&[&u], &[2.0], 50, 1e6).unwrap();
+    // 2, 4, 16, 256, 65536, and then beyond a million.
+    assert_eq!(run.diverged_at, Some(5));
+    assert!(run.y[5..].iter().all(|v| v.is_nan()));
+    assert_eq!(run.y[4], 65536.0);
+}
