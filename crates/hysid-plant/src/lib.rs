@@ -6,12 +6,14 @@
 
 mod dimension;
 mod document;
+mod engine;
 mod error;
 mod expr;
-mod tape;
+mod number;
 mod unit;
 
 pub use document::{ClockSource, Hold, Initial, Input, Output, Parameter, Simulation, State, Time};
+pub use engine::{Compiled, DataError, Direction, Drive, Injection, Observer, Response, Run, Sensitivity, Slot, Start};
 pub use error::{Error, ErrorKind, Place};
 pub use expr::{BinaryOp, Expr, ExprError, Function, Memory, is_legal_symbol};
 pub use unit::{Unit, UnitError};

@@ -140,7 +140,7 @@ fn simplify_node(expr: Expr) -> Expr {
         Expr::Call(f @ (Function::Abs | Function::Sign | Function::Step), arguments) => match arguments.as_slice() {
             [Expr::Number(x)] => Expr::Number(match f {
                 Function::Abs => x.abs(),
-                Function::Sign => crate::tape::sign(*x),
+                Function::Sign => crate::number::sign(*x),
                 _ => f64::from(u8::from(*x > 0.0)),
             }),
             _ => Expr::Call(f, arguments),
