@@ -186,7 +186,8 @@ mod tests {
         )
         .unwrap();
         let rows = examine(&r, "y", &[], Decimator::Plain, Phase::Lth, 15).unwrap();
-        let above: Vec<usize> = rows.iter().filter(|r| r.factor > 1 && r.mrd.as_printed > 0.05).map(|r| r.factor).collect();
+        let above: Vec<usize> =
+            rows.iter().filter(|r| r.factor > 1 && r.mrd.as_printed > 0.05).map(|r| r.factor).collect();
         assert_eq!(above, [11, 12, 13, 14, 15]);
         assert_eq!((rows[12].samples, rows[12].lost), (15, 19));
     }
