@@ -2,6 +2,7 @@
 
 pub mod evidence;
 pub mod file;
-pub mod picture;
+pub mod mechanism;
 mod random;
 pub mod refit;
+pub mod slot;

@@ -1,0 +1,27 @@
+//! Hysteresis of an actuator whose loop widens with the rate.
+
+use super::with_radii;
+use crate::mechanism::{Block, Family, Law, Mechanism, Need, anywhere, log_grid};
+use crate::slot::Place;
+
+/// Hysteresis of an actuator whose loop widens with the rate.
+pub static RATE_DEPENDENT_HYSTERESIS: Mechanism = Mechanism {
+    id: "rate_dependent_hysteresis",
+    family: Family::ActuatorHysteresis,
+    block: Block::Hysteresis,
+    places: &[Place::Input],
+    applies: anywhere,
+    already: &["lag(play(u, R), P)"],
+    law: |_, _| {
+        let lagged: String = (1..=3).map(|i| format!(" + p_{i}*(lag(play(u, r_{i}), tau) - u)")).collect();
+        with_radii(Law::replace(format!("u{lagged}")), "u", 3)
+            .shape("tau", "h", log_grid(0.5, 50.0, 4))
+            .within(0.05, 1000.0)
+    },
+    contains: &["prandtl_ishlinskii", "backlash"],
+    confusable: &["prandtl_ishlinskii", "actuator_lag", "viscoelastic"],
+    needs: &[Need::Turns(12), Need::Band(4.0)],
+    sentence: "The actuator {place} has a hysteresis loop that widens with the rate: its plays lag by {tau}.",
+    signature: "The loop widens with the frequency but does not vanish at slow rates.",
+    reference: "M. Al Janaideh, S. Rakheja, C.-Y. Su, An analytical generalized Prandtl-Ishlinskii model inversion, IEEE/ASME Trans. Mechatron. 16 (2011) 734-744; W. T. Ang, P. K. Khosla, C. N. Riviere (2007)",
+};

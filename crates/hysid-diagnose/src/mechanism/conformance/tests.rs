@@ -1,0 +1,25 @@
+use super::*;
+
+#[test]
+fn every_specimen_can_be_read() {
+    for (name, text) in SPECIMENS {
+        if let Err(e) = Simulation::parse(text, name) {
+            panic!("{e}");
+        }
+    }
+}
+
+#[test]
+fn every_mechanism_stands_somewhere_and_keeps_the_form() {
+    let mut stands: Vec<&str> = vec!["solver_artefact"];
+    let mut breaches = Vec::new();
+    for simulation in specimens() {
+        let structure = Structure::of(&simulation);
+        stands.extend(catalogue().iter().filter(|m| !m.slots(&structure).is_empty()).map(|m| m.id));
+        breaches.extend(check_simulation(&simulation));
+    }
+    let shown: Vec<String> = breaches.iter().map(|b| format!("{}: {}: {}", b.mechanism, b.at, b.what)).collect();
+    assert!(shown.is_empty(), "{} breaches:\n{}", shown.len(), shown.join("\n"));
+    let homeless: Vec<&str> = catalogue().iter().map(|m| m.id).filter(|id| !stands.contains(id)).collect();
+    assert!(homeless.is_empty(), "no specimen has a slot for {homeless:?}");
+}

@@ -1,0 +1,32 @@
+//! The electrical side of a drive: induced voltage and inductance.
+
+use crate::mechanism::{Block, Family, Law, Mechanism, Need, Purpose, log_grid};
+use crate::slot::Place;
+
+/// The electrical side of a drive: induced voltage and inductance.
+pub static BACK_EMF: Mechanism = Mechanism {
+    id: "back_emf",
+    family: Family::Electrical,
+    block: Block::Input,
+    places: &[Place::Input],
+    applies: |slot| slot.has("v"),
+    already: &["lag(u - P*v, Q)"],
+    law: |_, purpose| match purpose {
+        Purpose::Screening => Law::replace("u + w*(lag(u, tau_e) - u) - k_e*lag(v, tau_e)")
+            .weight()
+            .amplitude("k_e", "u/v", -0.5, 5.0)
+            .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
+            .within(0.02, 2000.0),
+        Purpose::Refit => Law::replace("lag(u - k_e*v, tau_e)")
+            .amplitude("k_e", "u/v", -0.5, 5.0)
+            .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
+            .within(0.02, 2000.0)
+            .never_baseline(),
+    },
+    contains: &["actuator_lag"],
+    confusable: &["actuator_lag", "delay"],
+    needs: &[Need::Band(3.0)],
+    sentence: "The drive has an electrical side {place}: a back-EMF of {k_e} and a time constant of {tau_e}.",
+    signature: "An input that weakens with the speed and lags.",
+    reference: "W. Leonhard, Control of Electrical Drives, 3rd ed., Springer (2001)",
+};

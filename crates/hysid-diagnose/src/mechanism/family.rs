@@ -1,0 +1,107 @@
+//! The families and blocks of the verdict, with their fixed names.
+
+use std::fmt::{self, Display, Formatter};
+
+macro_rules! named {
+    ($(#[$about:meta])* $type:ident { $($(#[$doc:meta])* $variant:ident = $name:literal),* $(,)? }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum $type { $($(#[$doc])* $variant),* }
+
+        impl $type {
+            /// Every one of them, in the order of the catalogue.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
+
+            /// The name in `diagnosis.json`.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name),* }
+            }
+        }
+
+        impl Display for $type {
+            fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+    };
+}
+
+named! {
+    /// What mechanisms are told apart by last: members of one family often look alike on a recording.
+    Family {
+        /// Friction that depends on the sign of the velocity.
+        DryFriction = "dry_friction",
+        /// Friction with an elastic part before sliding.
+        Presliding = "presliding",
+        /// Damping that is not proportional to the velocity.
+        NonlinearDamping = "nonlinear_damping",
+        /// A symmetric spring that stiffens.
+        HardeningStiffness = "hardening_stiffness",
+        /// A spring with unequal sides.
+        AsymmetricStiffness = "asymmetric_stiffness",
+        /// Free play inside a spring.
+        Clearance = "clearance",
+        /// A spring with a hysteresis loop.
+        HystereticSpring = "hysteretic_spring",
+        /// Backlash.
+        Play = "play",
+        /// Hysteresis of an actuator.
+        ActuatorHysteresis = "actuator_hysteresis",
+        /// A curved input characteristic without memory.
+        InputNonlinearity = "input_nonlinearity",
+        /// A pure phase error of the signal path.
+        SignalPathLag = "signal_path_lag",
+        /// A parameter that changes.
+        TimeVariation = "time_variation",
+        /// A resonance that the simulation lacks.
+        ExtraMode = "extra_mode",
+        /// A constant.
+        Bias = "bias",
+        /// Weight.
+        Gravity = "gravity",
+        /// A force that is periodic in the position.
+        PositionRipple = "position_ripple",
+        /// Inertia that is not constant.
+        Inertia = "inertia",
+        /// Relaxation and creep.
+        LinearMemory = "linear_memory",
+        /// A curved or coarse sensor.
+        SensorNonlinearity = "sensor_nonlinearity",
+        /// A sensor whose zero moves.
+        SensorDrift = "sensor_drift",
+        /// The electrical side of a drive.
+        Electrical = "electrical",
+        /// Losses of a store.
+        Storage = "storage",
+        /// Separation that lags behind the angle.
+        AeroMemory = "aero_memory",
+        /// A force that follows the clock.
+        ExternalDisturbance = "external_disturbance",
+        /// The simulation's own numerics.
+        Numerics = "numerics",
+        /// None of the catalogue.
+        Outside = "outside",
+    }
+}
+
+named! {
+    /// The part of a simulation in which an effect stands.
+    Block {
+        /// Before the plant.
+        Input = "input",
+        /// Forces of the displacement.
+        Restoring = "restoring",
+        /// Forces of the velocity.
+        Damping = "damping",
+        /// Forces with memory.
+        Hysteresis = "hysteresis",
+        /// Forces of the acceleration.
+        Inertia = "inertia",
+        /// Behind the plant.
+        Output = "output",
+        /// A parameter that changes.
+        TimeVariation = "time_variation",
+        /// From outside.
+        Disturbance = "disturbance",
+    }
+}

@@ -1,0 +1,36 @@
+//! A hysteretic spring whose two branches differ.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_grid};
+use crate::slot::Place;
+
+/// A hysteretic spring whose two branches differ.
+pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
+    id: "asymmetric_bouc_wen",
+    family: Family::HystereticSpring,
+    block: Block::Hysteresis,
+    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
+    already: &[],
+    law: |_, _| {
+        // The share a makes z tend to 1/(1 + a)^(1/n) upwards and to 1/(1 - a)^(1/n) downwards.
+        Law::force("F_h*z")
+            .amplitude("F_h", "F", -1.0, 2.0)
+            .shape("x_y", "x", log_grid(0.1, 3.0, 4))
+            .within(0.02, 20.0)
+            .shape("b", "1", Grid::Values(vec![0.5]))
+            .within(0.3, 5.0)
+            .shape("n_z", "1", Grid::Values(vec![1.0]))
+            .within(1.0, 6.0)
+            .shape("a_z", "1", Grid::Values(vec![-0.3, 0.3]))
+            .within(-0.9, 0.9)
+            .state("z", "1", "(v - abs(z)^(n_z - 1)*(b*abs(v)*z + (1 - b + a_z*sign(z))*v*abs(z)))/x_y")
+            .report("k_h", "F/x", "F_h/x_y")
+            .report("gamma_over_beta", "1", "(1 - b)/b")
+    },
+    contains: &["bouc_wen", "dahl_friction"],
+    confusable: &["bouc_wen", "quadratic_stiffness"],
+    needs: &[Need::Reversals("v", 6), Need::BothSides("x"), Need::Levels("x", 1.5)],
+    sentence: "A hysteretic spring with unequal branches acts {place}: it yields over {x_y} at {F_h}, the branches differing by the share {a_z}.",
+    signature: "Unequal upper and lower branches; even harmonics together with a loop.",
+    reference: "C.-H. Wang, Y.-K. Wen, Evaluation of pre-Northridge low-rise steel buildings I: modeling, J. Struct. Eng. 126 (2000) 1151-1160",
+};

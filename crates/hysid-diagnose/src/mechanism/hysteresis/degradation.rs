@@ -1,0 +1,35 @@
+//! A hysteretic spring that weakens with the energy it has dissipated.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_grid};
+use crate::slot::Place;
+
+/// A hysteretic spring that weakens with the energy it has dissipated.
+pub static DEGRADATION: Mechanism = Mechanism {
+    id: "degradation",
+    family: Family::HystereticSpring,
+    block: Block::Hysteresis,
+    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
+    already: &[],
+    law: |_, _| {
+        Law::force("F_h*z")
+            .amplitude("F_h", "F", -1.0, 2.0)
+            .shape("x_y", "x", log_grid(0.1, 2.0, 4))
+            .within(0.02, 20.0)
+            .shape("d_nu", "x/(v*T)", Grid::Values(vec![0.5]))
+            .within(0.0, 20.0)
+            .shape("d_eta", "x/(v*T)", Grid::Values(vec![0.5]))
+            .within(0.0, 20.0)
+            .shape("b", "1", Grid::Values(vec![0.5]))
+            .within(0.3, 5.0)
+            .state("z", "1", "(v - (1 + d_nu*e)*(b*abs(v)*z + (1 - b)*v*abs(z)))/((1 + d_eta*e)*x_y)")
+            .state("e", "1", "max(z*v, 0)/x_y")
+            .report("k_h", "F/x", "F_h/x_y")
+    },
+    contains: &["bouc_wen", "dahl_friction"],
+    confusable: &["parameter_drift", "dissipation_heating"],
+    needs: &[Need::Reversals("v", 6), Need::EarlyAndLate("x")],
+    sentence: "A hysteretic spring that weakens as it works acts {place}: it yields over {x_y} at {F_h} at first.",
+    signature: "A change in one direction that follows the dissipated energy, not the clock.",
+    reference: "T. T. Baber, Y.-K. Wen, Random vibration of hysteretic degrading systems, J. Eng. Mech. Div. 107 (1981) 1069-1087",
+};

@@ -1,0 +1,36 @@
+//! A hysteretic spring that slips near the middle.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_grid};
+use crate::slot::Place;
+
+/// A hysteretic spring that slips near the middle.
+pub static PINCHING: Mechanism = Mechanism {
+    id: "pinching",
+    family: Family::HystereticSpring,
+    block: Block::Hysteresis,
+    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
+    already: &[],
+    law: |_, _| {
+        Law::force("F_h*z")
+            .amplitude("F_h", "F", -1.0, 2.0)
+            .shape("x_y", "x", log_grid(0.1, 2.0, 4))
+            .within(0.02, 20.0)
+            .shape("zeta_1", "1", Grid::Values(vec![0.6]))
+            .within(0.0, 0.97)
+            .shape("zeta_2", "1", Grid::Values(vec![0.2, 0.5]))
+            .within(0.02, 2.0)
+            .shape("q_z", "1", Grid::Values(vec![0.1]))
+            .within(-0.5, 0.9)
+            .shape("b", "1", Grid::Values(vec![0.5]))
+            .within(0.3, 5.0)
+            .state("z", "1", "(1 - zeta_1*exp(-((z*sign(v) - q_z)/zeta_2)^2))*(v - b*abs(v)*z - (1 - b)*v*abs(z))/x_y")
+            .report("k_h", "F/x", "F_h/x_y")
+    },
+    contains: &["bouc_wen", "dahl_friction"],
+    confusable: &["spring_clearance", "displacement_dependent_damping", "bouc_wen"],
+    needs: &[Need::Reversals("v", 6), Need::Levels("x", 1.5)],
+    sentence: "A hysteretic spring that pinches acts {place}: it yields over {x_y} at {F_h} and slips near the middle (slip {zeta_1}).",
+    signature: "A pinched loop: little stiffness near the middle after sliding.",
+    reference: "T. T. Baber, M. N. Noori, Random vibration of degrading, pinching systems, J. Eng. Mech. 111 (1985) 1010-1026",
+};

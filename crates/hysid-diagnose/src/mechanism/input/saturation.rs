@@ -1,0 +1,27 @@
+//! An input that does not grow beyond a limit.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere};
+use crate::slot::Place;
+
+/// An input that does not grow beyond a limit.
+pub static INPUT_SATURATION: Mechanism = Mechanism {
+    id: "input_saturation",
+    family: Family::InputNonlinearity,
+    block: Block::Input,
+    places: &[Place::Input],
+    applies: anywhere,
+    already: &["max(min(u, P), Q)", "min(max(u, P), Q)"],
+    law: |_, purpose| {
+        let level = Grid::Quantiles("u", vec![0.5, 0.65, 0.8, 0.9, 0.95, 0.99]);
+        match purpose {
+            Purpose::Screening => Law::replace("u + w*(max(min(u, s), -s) - u)").weight().shape("s", "u", level),
+            Purpose::Refit => Law::replace("max(min(u, s), -s)").shape("s", "u", level),
+        }
+    },
+    contains: &[],
+    confusable: &["output_saturation", "input_polynomial"],
+    needs: &[Need::Levels("u", 1.2)],
+    sentence: "The input saturates at {s} {place}; the simulation lets it grow.",
+    signature: "The residual lives only where the input is large.",
+    reference: "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, Wiley (1996)",
+};

@@ -1,0 +1,290 @@
+//! A mechanism's law at one slot, as text in the language of simulation files.
+//!
+//! The text may use the symbols that the [`Slot`](crate::slot::Slot) offers (`x`, `v`, `u`, `y`, `p`, `k`, `m`, ...) and the
+//! law's own parameters and states. Own names that the simulation already uses are given a number when the law is written
+//! into it, so the text can be read as the physics.
+//!
+//! A `measure` is text as well: `F/x^3` says both the unit of a parameter and its natural size on a recording (the rms of the
+//! force over the cubed rms of the displacement). `T` is the recording's duration, `h` its sampling period, both in seconds.
+
+/// What a law is written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Purpose {
+    /// To be ranked: linear in its amplitudes, whose zero is the baseline; shapes lie on a grid.
+    Screening,
+    /// To be fitted and handed out: the physical parameters.
+    Refit,
+}
+
+/// How the law's text enters the simulation at its slot.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Change {
+    /// A force that resists: taken from the force of a motion, added to the output of a static force law.
+    Force(String),
+    /// An external force: the opposite sign.
+    Drive(String),
+    /// A rate taken from the derivative of a store.
+    Outflow(String),
+    /// An expression that replaces the input, the parameter or the output of the slot.
+    Replace(String),
+    /// The acceleration becomes (force - `force`)/(mass + `mass`).
+    Inertia {
+        /// Added to what resists.
+        force: String,
+        /// Added to the mass.
+        mass: String,
+    },
+}
+
+/// The values that a shape parameter is tried at.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Grid {
+    /// These multiples of the measure.
+    Values(Vec<f64>),
+    /// These shares of half the range of a slot's signal.
+    Reach(&'static str, Vec<f64>),
+    /// Quantiles of the absolute value of a slot's signal.
+    Quantiles(&'static str, Vec<f64>),
+    /// Quantiles of a slot's signal.
+    SignedQuantiles(&'static str, Vec<f64>),
+    /// That many points inside the recording's duration, in seconds.
+    Times(usize),
+    /// That many frequencies over the excited band, in Hz, logarithmic.
+    Band(usize),
+    /// That many time constants from the excited band's fastest to a quarter of the recording, in seconds, logarithmic.
+    Memory(usize),
+    /// Frequencies of the largest peaks of the residual, else that many over the whole band, in Hz.
+    Peaks(usize),
+    /// The smallest step between the recorded values of the slot's output.
+    Resolution,
+}
+
+/// What a law's parameter is to the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Role {
+    /// Zero is the baseline.
+    Amplitude,
+    /// Has no effect while the amplitudes are zero; tried on a grid.
+    Shape(Grid),
+    /// Set once from the recording, then fixed.
+    Constant(Grid),
+}
+
+/// A parameter of a law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawParameter {
+    /// Its name in the law.
+    pub name: String,
+    /// Its unit and natural size.
+    pub measure: String,
+    /// What it is to the fit.
+    pub role: Role,
+    /// Smallest and largest value: in multiples of the measure. `None`: taken from the grid.
+    pub range: Option<(f64, f64)>,
+    /// The value at which the rewritten simulation is the baseline whatever the others are, in multiples of the measure.
+    pub neutral: Option<f64>,
+    /// Whether it is reported under its own name.
+    pub reported: bool,
+}
+
+/// A state that a law adds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawState {
+    /// Its name in the law.
+    pub name: String,
+    /// Its unit.
+    pub measure: String,
+    /// Its derivative.
+    pub derivative: String,
+    /// Where it starts.
+    pub start: Start,
+}
+
+/// Where an added state starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// At rest.
+    Zero,
+    /// As the state that this symbol of the slot stands for; at zero where it stands for something else.
+    Like(&'static str),
+}
+
+/// A number that is reported although it is not a parameter of the law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derived {
+    /// Its name in the report.
+    pub name: String,
+    /// Its unit.
+    pub measure: String,
+    /// Its value, from the law's parameters and the slot's symbols `k`, `c`, `m`.
+    pub value: String,
+}
+
+/// A law at one slot: see the module.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Law {
+    /// How it enters the simulation.
+    pub change: Change,
+    /// Its parameters.
+    pub parameters: Vec<LawParameter>,
+    /// The states that it adds.
+    pub states: Vec<LawState>,
+    /// What is reported besides the parameters.
+    pub derived: Vec<Derived>,
+    /// No finite values of the parameters make it the baseline.
+    pub never_baseline: bool,
+}
+
+impl Law {
+    fn new(change: Change) -> Self {
+        Self { change, parameters: Vec::new(), states: Vec::new(), derived: Vec::new(), never_baseline: false }
+    }
+
+    /// A force that resists.
+    pub fn force(text: impl Into<String>) -> Self {
+        Self::new(Change::Force(text.into()))
+    }
+
+    /// An external force.
+    pub fn drive(text: impl Into<String>) -> Self {
+        Self::new(Change::Drive(text.into()))
+    }
+
+    /// A loss of a store.
+    pub fn outflow(text: impl Into<String>) -> Self {
+        Self::new(Change::Outflow(text.into()))
+    }
+
+    /// What stands instead of the slot's input, parameter or output.
+    pub fn replace(text: impl Into<String>) -> Self {
+        Self::new(Change::Replace(text.into()))
+    }
+
+    /// A mass that is not constant and the force that comes with it.
+    pub fn inertia(force: impl Into<String>, mass: impl Into<String>) -> Self {
+        Self::new(Change::Inertia { force: force.into(), mass: mass.into() })
+    }
+
+    /// The weight `w` of a screening form; not reported.
+    #[must_use]
+    pub fn weight(self) -> Self {
+        self.amplitude("w", "1", -2.0, 2.0).silent()
+    }
+
+    /// An amplitude between `low` and `high` (multiples of `measure`).
+    #[must_use]
+    pub fn amplitude(mut self, name: impl Into<String>, measure: impl Into<String>, low: f64, high: f64) -> Self {
+        self.parameters.push(LawParameter {
+            name: name.into(),
+            measure: measure.into(),
+            role: Role::Amplitude,
+            range: Some((low, high)),
+            neutral: Some(0.0),
+            reported: true,
+        });
+        self
+    }
+
+    /// A shape parameter.
+    #[must_use]
+    pub fn shape(mut self, name: impl Into<String>, measure: impl Into<String>, grid: Grid) -> Self {
+        self.parameters.push(LawParameter {
+            name: name.into(),
+            measure: measure.into(),
+            role: Role::Shape(grid),
+            range: None,
+            neutral: None,
+            reported: true,
+        });
+        self
+    }
+
+    /// A parameter that the recording sets and nothing fits: the first value of its grid.
+    #[must_use]
+    pub fn constant(mut self, name: impl Into<String>, measure: impl Into<String>, grid: Grid) -> Self {
+        self.parameters.push(LawParameter {
+            name: name.into(),
+            measure: measure.into(),
+            role: Role::Constant(grid),
+            range: None,
+            neutral: None,
+            reported: true,
+        });
+        self
+    }
+
+    fn last(mut self, change: impl FnOnce(&mut LawParameter)) -> Self {
+        if let Some(parameter) = self.parameters.last_mut() {
+            change(parameter);
+        }
+        self
+    }
+
+    /// Bounds of the last parameter, in multiples of its measure.
+    #[must_use]
+    pub fn within(self, low: f64, high: f64) -> Self {
+        self.last(|p| p.range = Some((low, high)))
+    }
+
+    /// The value of the last parameter at which the simulation is the baseline, in multiples of its measure.
+    #[must_use]
+    pub fn neutral(self, value: f64) -> Self {
+        self.last(|p| p.neutral = Some(value))
+    }
+
+    /// Leaves the last parameter out of the report.
+    #[must_use]
+    pub fn silent(self) -> Self {
+        self.last(|p| p.reported = false)
+    }
+
+    /// States that no finite values of the parameters make it the baseline.
+    #[must_use]
+    pub fn never_baseline(mut self) -> Self {
+        self.never_baseline = true;
+        self
+    }
+
+    /// A state that starts at rest.
+    #[must_use]
+    pub fn state(mut self, name: impl Into<String>, measure: impl Into<String>, derivative: impl Into<String>) -> Self {
+        self.states.push(LawState {
+            name: name.into(),
+            measure: measure.into(),
+            derivative: derivative.into(),
+            start: Start::Zero,
+        });
+        self
+    }
+
+    /// The last state starts as the state behind `symbol`.
+    #[must_use]
+    pub fn starting_like(mut self, symbol: &'static str) -> Self {
+        if let Some(state) = self.states.last_mut() {
+            state.start = Start::Like(symbol);
+        }
+        self
+    }
+
+    /// Reports a number made of the parameters; a parameter of the same name is then left out of the report.
+    #[must_use]
+    pub fn report(mut self, name: impl Into<String>, measure: impl Into<String>, value: impl Into<String>) -> Self {
+        let name = name.into();
+        if let Some(own) = self.parameters.iter_mut().find(|p| p.name == name) {
+            own.reported = false;
+        }
+        self.derived.push(Derived { name, measure: measure.into(), value: value.into() });
+        self
+    }
+}
+
+/// `count` logarithmic steps from `low` to `high`.
+pub(crate) fn log_steps(low: f64, high: f64, count: usize) -> Vec<f64> {
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(|i| low * (high / low).powf(i as f64 / last)).collect()
+}
+
+/// A grid of `count` logarithmic multiples of the measure.
+pub(crate) fn log_grid(low: f64, high: f64, count: usize) -> Grid {
+    Grid::Values(log_steps(low, high, count))
+}

@@ -1,0 +1,185 @@
+//! The catalogue: every mechanism that the diagnosis can name, one file each.
+//!
+//! **A mechanism is a rewriting of the simulation.** Given a simulation and a [`Slot`], [`Mechanism::rewrite`] returns another
+//! simulation in the same language, with amplitudes whose zero is the baseline, shape parameters on a grid, and perhaps new
+//! states or operators with memory. Features, refits, composition and the file that the user gets all come from that one
+//! rewriting.
+//!
+//! A mechanism's file holds data: the law as text ([`Law`]), the places where it can stand, what the recording must show for
+//! it to be seen ([`Need`]), a sentence for people, a reference. `docs/catalogue.md` is printed from it. To add one: write
+//! its file beside its family, list it in [`catalogue`], run the conformance suite ([`conformance`]).
+
+pub mod conformance;
+mod excitation;
+mod family;
+mod law;
+mod page;
+mod rewrite;
+mod sentence;
+mod signals;
+
+mod actuator;
+mod aero;
+mod bias;
+mod damping;
+mod drive;
+mod friction;
+mod hysteresis;
+mod input;
+mod mode;
+pub mod numerics;
+mod path;
+mod play;
+mod presliding;
+mod sensor;
+mod stiffness;
+mod storage;
+mod time;
+mod viscous_memory;
+
+use crate::slot::{Place, Slot, Structure};
+
+pub use excitation::Need;
+pub use family::{Block, Family};
+pub use law::{Change, Derived, Grid, Law, LawParameter, LawState, Purpose, Role, Start};
+pub(crate) use law::{log_grid, log_steps};
+pub use page::catalogue_page;
+pub use rewrite::{Amplitude, Reported, RewriteError, Rewritten, Shape};
+pub use sentence::{Value, number_with_unit};
+pub use signals::Signals;
+
+/// One entry of the catalogue.
+#[derive(Debug)]
+pub struct Mechanism {
+    /// The name in `diagnosis.json`.
+    pub id: &'static str,
+    /// Its family.
+    pub family: Family,
+    /// The part of the simulation in which it stands; at an input or a sensor that part is named instead.
+    pub block: Block,
+    /// Where it can stand.
+    pub places: &'static [Place],
+    /// A further condition on the slot.
+    pub applies: fn(&Slot) -> bool,
+    /// Patterns of a baseline that already has it at the slot. Capital letters of one character match anything.
+    pub already: &'static [&'static str],
+    /// The law at a slot.
+    pub law: fn(&Slot, Purpose) -> Law,
+    /// Mechanisms that it turns into at special values of its parameters: it must earn what it has more than they.
+    pub contains: &'static [&'static str],
+    /// What it is often mistaken for.
+    pub confusable: &'static [&'static str],
+    /// What the recording must show for it to be seen.
+    pub needs: &'static [Need],
+    /// For people; `{name}` stands for a reported value with its unit, `{place}` for where it is.
+    pub sentence: &'static str,
+    /// How it shows.
+    pub signature: &'static str,
+    /// Where the law comes from.
+    pub reference: &'static str,
+}
+
+/// For `Mechanism::applies`: every slot of the right place.
+pub(crate) fn anywhere(_: &Slot) -> bool {
+    true
+}
+
+impl Mechanism {
+    /// The slots of a simulation at which this mechanism is a candidate: of the right kind, and the baseline has not got it
+    /// there.
+    pub fn slots(&self, structure: &Structure) -> Vec<Slot> {
+        let fits = |slot: &&Slot| self.places.contains(&slot.place) && (self.applies)(slot) && !self.is_in(slot);
+        structure.slots.iter().filter(fits).cloned().collect()
+    }
+
+    /// Whether the baseline already has this mechanism at the slot.
+    pub fn is_in(&self, slot: &Slot) -> bool {
+        self.already.iter().any(|pattern| slot.shows(pattern))
+    }
+
+    /// The block of `diagnosis.json` at that slot.
+    pub fn block_at(&self, slot: &Slot) -> Block {
+        match (slot.place, self.block) {
+            (_, Block::TimeVariation | Block::Disturbance) => self.block,
+            (Place::Input, _) => Block::Input,
+            (Place::Sensor, _) => Block::Output,
+            _ => self.block,
+        }
+    }
+
+    /// The other members of its family.
+    pub fn siblings(&self) -> impl Iterator<Item = &'static Mechanism> + '_ {
+        catalogue().iter().copied().filter(|m| m.family == self.family && m.id != self.id)
+    }
+
+    /// What the recording lacks for this mechanism to be seen at the slot, in words; `None` when nothing is lacking.
+    pub fn lacking(&self, signals: &Signals) -> Option<String> {
+        let missing: Vec<String> = self.needs.iter().filter_map(|need| need.lacking(signals)).collect();
+        if missing.is_empty() { None } else { Some(missing.join("; ")) }
+    }
+}
+
+/// Every mechanism, in the order of the families.
+pub fn catalogue() -> &'static [&'static Mechanism] {
+    CATALOGUE
+}
+
+static CATALOGUE: &[&Mechanism] = &[
+    &friction::COULOMB_FRICTION,
+    &friction::ASYMMETRIC_FRICTION,
+    &friction::STRIBECK_FRICTION,
+    &friction::LOAD_DEPENDENT_FRICTION,
+    &presliding::DAHL_FRICTION,
+    &presliding::LUGRE_FRICTION,
+    &presliding::ELASTOPLASTIC_FRICTION,
+    &damping::QUADRATIC_DAMPING,
+    &damping::POWER_LAW_DAMPING,
+    &damping::DISPLACEMENT_DEPENDENT_DAMPING,
+    &stiffness::CUBIC_STIFFNESS,
+    &stiffness::QUINTIC_STIFFNESS,
+    &stiffness::GAP_STOP,
+    &stiffness::QUADRATIC_STIFFNESS,
+    &stiffness::BILINEAR_STIFFNESS,
+    &stiffness::SPRING_CLEARANCE,
+    &hysteresis::BOUC_WEN,
+    &hysteresis::ASYMMETRIC_BOUC_WEN,
+    &hysteresis::PINCHING,
+    &hysteresis::DEGRADATION,
+    &play::BACKLASH,
+    &actuator::PREISACH,
+    &actuator::PRANDTL_ISHLINSKII,
+    &actuator::ASYMMETRIC_HYSTERESIS,
+    &actuator::RATE_DEPENDENT_HYSTERESIS,
+    &input::DEAD_ZONE,
+    &input::INPUT_SATURATION,
+    &input::INPUT_POLYNOMIAL,
+    &path::DELAY,
+    &path::ACTUATOR_LAG,
+    &path::SENSOR_LAG,
+    &time::PARAMETER_DRIFT,
+    &time::DISSIPATION_HEATING,
+    &time::ABRUPT_CHANGE,
+    &mode::UNMODELLED_MODE,
+    &bias::INPUT_OFFSET,
+    &bias::OUTPUT_OFFSET,
+    &stiffness::GRAVITY,
+    &stiffness::COGGING,
+    &mode::POSITION_DEPENDENT_INERTIA,
+    &viscous_memory::VISCOELASTIC,
+    &viscous_memory::LOG_CREEP,
+    &sensor::OUTPUT_SATURATION,
+    &sensor::QUANTISATION,
+    &sensor::RECTIFIED_OUTPUT,
+    &sensor::SENSOR_DRIFT,
+    &drive::BACK_EMF,
+    &storage::LEAKAGE,
+    &storage::OVERFLOW,
+    &aero::STALL_LAG,
+    &time::PERIODIC_DISTURBANCE,
+    &numerics::SOLVER_ARTEFACT,
+];
+
+/// The mechanism of that name.
+pub fn mechanism(id: &str) -> Option<&'static Mechanism> {
+    catalogue().iter().copied().find(|m| m.id == id)
+}

@@ -1,0 +1,45 @@
+//! A resonance that the simulation lacks.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
+use crate::slot::Place;
+
+/// A resonance that the simulation lacks.
+pub static UNMODELLED_MODE: Mechanism = Mechanism {
+    id: "unmodelled_mode",
+    family: Family::ExtraMode,
+    block: Block::Inertia,
+    places: &[Place::Force, Place::Sensor],
+    applies: |slot| slot.inputs() > 0 && (slot.place == Place::Sensor || slot.has("x")),
+    already: &[],
+    law: |slot, _| {
+        if slot.place == Place::Force {
+            // A mass on a spring that hangs on the moving part: the force that accelerates it is missing there.
+            return Law::force("m_a*((2*pi*f_a)^2*(x - x_a) + 4*pi*f_a*zeta_a*(v - v_a))")
+                .amplitude("m_a", slot.mass_measure(), -0.05, 5.0)
+                .shape("f_a", "1/t", Grid::Band(17))
+                .shape("zeta_a", "1", Grid::Values(vec![0.02]))
+                .within(0.001, 0.7)
+                .state("x_a", "x", "v_a")
+                .starting_like("x")
+                .state("v_a", "x/t", "(2*pi*f_a)^2*(x - x_a) + 4*pi*f_a*zeta_a*(v - v_a)")
+                .starting_like("v");
+        }
+        // A mode of its own beside the plant, seen by the sensor.
+        let drive: String = (1..=slot.inputs()).map(|i| format!("b_{i}*u_{i} + ")).collect();
+        let mut law = Law::replace("y + q_a").state("q_a", "y", "p_a").state(
+            "p_a",
+            "y/t",
+            format!("(2*pi*f_a)^2*({drive}-q_a) - 4*pi*f_a*zeta_a*p_a"),
+        );
+        for i in 1..=slot.inputs() {
+            law = law.amplitude(format!("b_{i}"), format!("y/u_{i}"), -3.0, 3.0);
+        }
+        law.shape("f_a", "1/t", Grid::Band(17)).shape("zeta_a", "1", Grid::Values(vec![0.02])).within(0.001, 0.7)
+    },
+    contains: &[],
+    confusable: &["delay", "viscoelastic"],
+    needs: &[Need::Band(1.5)],
+    sentence: "A resonance near {f_a} is missing {place}.",
+    signature: "The residual lives in a narrow band, grows in proportion to the input, and its phase flips there.",
+    reference: "D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000)",
+};

@@ -1,0 +1,120 @@
+//! `docs/catalogue.md`, printed from the catalogue.
+
+use std::fmt::Write;
+
+use super::conformance::specimens;
+use super::{Change, Family, Grid, Law, Mechanism, Purpose, Role, catalogue};
+use crate::slot::{Place, Structure};
+
+fn law_text(law: &Law) -> String {
+    match &law.change {
+        Change::Force(text) => format!("resisting force `{text}`"),
+        Change::Drive(text) => format!("external force `{text}`"),
+        Change::Outflow(text) => format!("outflow `{text}`"),
+        Change::Replace(text) => format!("becomes `{text}`"),
+        Change::Inertia { force, mass } => format!("further mass `{mass}` with the force `{force}`"),
+    }
+}
+
+fn place_name(place: Place) -> &'static str {
+    match place {
+        Place::Input => "input",
+        Place::Force => "force on a moving part",
+        Place::Connection => "force between two parts",
+        Place::ForceLaw => "static force law",
+        Place::Store => "store",
+        Place::Sensor => "sensor",
+        Place::Parameter => "parameter",
+        Place::Disturbance => "disturbance",
+    }
+}
+
+fn parameters(law: &Law) -> String {
+    let described = law.parameters.iter().map(|p| {
+        let what = match &p.role {
+            Role::Amplitude => match p.range {
+                Some((low, high)) => format!("{low} to {high}"),
+                None => "any".to_owned(),
+            },
+            Role::Shape(grid) | Role::Constant(grid) => match grid {
+                Grid::Values(v) => format!("{} values", v.len()),
+                Grid::Reach(s, v) => format!("{} shares of half the range of {s}", v.len()),
+                Grid::Quantiles(s, v) => format!("{} quantiles of the size of {s}", v.len()),
+                Grid::SignedQuantiles(s, v) => format!("{} quantiles of {s}", v.len()),
+                Grid::Times(n) => format!("{n} moments"),
+                Grid::Band(n) => format!("{n} frequencies of the excited band"),
+                Grid::Memory(n) => format!("{n} time constants"),
+                Grid::Peaks(n) => format!("peaks of the residual, else {n} frequencies"),
+                Grid::Resolution => "the recorded steps".to_owned(),
+            },
+        };
+        format!("`{}` [{}]: {what}", p.name, p.measure)
+    });
+    described.collect::<Vec<_>>().join("; ")
+}
+
+/// The page as Markdown.
+pub fn catalogue_page() -> String {
+    let mut page = String::from(
+        "# The catalogue of mechanisms\n\n\
+         Printed from the code (`crates/hysid-diagnose/src/mechanism`); a test holds the two equal. Symbols of a law: `x`, `v` displacement and\n\
+         velocity at the slot, `u` input, `y` output, `s` what a store holds, `p` the parameter, `F` the size of the forces, `k`, `m` the\n\
+         simulation's own stiffness and mass there, `t` time, `T` duration, `h` sampling period. In brackets stands what a parameter is measured\n\
+         in: its unit, and its natural size on a recording. `w` is the weight of a form that exists for screening only.\n",
+    );
+    let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
+    for family in Family::ALL {
+        let members: Vec<&Mechanism> = catalogue().iter().copied().filter(|m| m.family == *family).collect();
+        if members.is_empty() {
+            continue;
+        }
+        let _ = write!(page, "\n## {family}\n");
+        for mechanism in members {
+            entry(&mut page, mechanism, &structures);
+        }
+    }
+    page
+}
+
+fn entry(page: &mut String, mechanism: &Mechanism, structures: &[Structure]) {
+    let _ = write!(page, "\n### {}\n\n{}\n\n", mechanism.id, mechanism.signature);
+    let mut told: Vec<String> = Vec::new();
+    for place in mechanism.places {
+        let mut slots = structures.iter().flat_map(|s| mechanism.slots(s));
+        let Some(slot) = slots.find(|s| s.place == *place) else { continue };
+        let refit = (mechanism.law)(&slot, Purpose::Refit);
+        let screening = (mechanism.law)(&slot, Purpose::Screening);
+        let mut text = law_text(&refit);
+        if screening.change != refit.change {
+            let _ = write!(text, "; screened as {}", law_text(&screening));
+        }
+        for state in &refit.states {
+            let _ = write!(text, "; state {}' = `{}`", state.name, state.derivative);
+        }
+        let _ = write!(text, "\n  - parameters: {}", parameters(&refit));
+        match told.iter().position(|t| t.ends_with(&text)) {
+            Some(at) => {
+                if let Some(t) = told.get_mut(at) {
+                    *t = format!("{}, {t}", place_name(*place));
+                }
+            }
+            None => told.push(format!("{}: {text}", place_name(*place))),
+        }
+    }
+    for text in told {
+        let _ = writeln!(page, "- {text}");
+    }
+    let list = |names: &[&str]| names.join(", ");
+    if !mechanism.contains.is_empty() {
+        let _ = writeln!(page, "- contains: {}", list(mechanism.contains));
+    }
+    if !mechanism.confusable.is_empty() {
+        let _ = writeln!(page, "- mistaken for: {}", list(mechanism.confusable));
+    }
+    if !mechanism.needs.is_empty() {
+        let needs: Vec<String> = mechanism.needs.iter().map(super::Need::describe).collect();
+        let _ = writeln!(page, "- needs: {}", needs.join("; "));
+    }
+    let _ = writeln!(page, "- told as: {}", mechanism.sentence);
+    let _ = writeln!(page, "- {}", mechanism.reference);
+}

@@ -1,0 +1,28 @@
+//! A sensor that follows with a first-order lag.
+
+use crate::mechanism::{Block, Family, Law, Mechanism, Need, Purpose, anywhere, log_grid};
+use crate::slot::Place;
+
+/// A sensor that follows with a first-order lag.
+pub static SENSOR_LAG: Mechanism = Mechanism {
+    id: "sensor_lag",
+    family: Family::SignalPathLag,
+    block: Block::Input,
+    places: &[Place::Sensor],
+    applies: anywhere,
+    already: &["lag(u, P)", "lag(y, P)"],
+    law: |slot, purpose| {
+        let s = if slot.place == Place::Sensor { "y" } else { "u" };
+        let law = match purpose {
+            Purpose::Screening => Law::replace(format!("{s} + w*(lag({s}, tau) - {s})")).weight(),
+            Purpose::Refit => Law::replace(format!("lag({s}, tau)")),
+        };
+        law.shape("tau", "h", log_grid(0.5, 50.0, 6)).within(0.02, 2000.0)
+    },
+    contains: &[],
+    confusable: &["delay", "actuator_lag", "viscoelastic"],
+    needs: &[Need::Band(1.5)],
+    sentence: "The sensor follows with a lag of {tau} {place}; the simulation takes it as immediate.",
+    signature: "A phase error and a roll-off; on a linear plant the same as an actuator's lag.",
+    reference: "L. Ljung, System Identification: Theory for the User, 2nd ed. (1999)",
+};

@@ -1,0 +1,5 @@
+//! Backlash.
+
+mod backlash;
+
+pub use backlash::BACKLASH;

@@ -1,0 +1,342 @@
+//! Writing a mechanism's law into a simulation.
+
+use std::collections::BTreeMap;
+
+use hysid_plant::{Expr, Initial, Parameter, Simulation, State, Unit};
+
+use super::signals::Signals;
+use super::{Change, Law, Mechanism, Purpose, Role, Start};
+use crate::slot::{ForcePath, Slot, Target, force_path};
+
+/// A parameter whose zero is the baseline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Amplitude {
+    /// Its name in the rewritten simulation.
+    pub name: String,
+    /// Its natural size on this recording, above zero: where the effect is as large as the signals allow.
+    pub size: f64,
+}
+
+/// A parameter that shapes the effect and has no influence while the amplitudes are zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Its name in the rewritten simulation.
+    pub name: String,
+    /// The values to try, in ascending order.
+    pub grid: Vec<f64>,
+}
+
+/// What `diagnosis.json` reports of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reported {
+    /// The name in the report.
+    pub name: String,
+    /// The unit, where the simulation settles it.
+    pub unit: Option<Unit>,
+    /// The value, over the parameters of the rewritten simulation.
+    pub value: Expr,
+}
+
+/// A simulation with an effect in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rewritten {
+    /// The simulation; the effect's amplitudes are zero in it, its shapes stand in the middle of their grids.
+    pub simulation: Simulation,
+    /// The parameters whose zero is the baseline. Their signs of plausibility are the bounds in the simulation.
+    pub amplitudes: Vec<Amplitude>,
+    /// The parameters on grids.
+    pub shapes: Vec<Shape>,
+    /// Values at which the simulation is the baseline; empty where no finite value is.
+    pub neutral: Vec<(String, f64)>,
+    /// Whether the equations are linear in the amplitudes.
+    pub linear: bool,
+    /// What is reported.
+    pub report: Vec<Reported>,
+    /// States that were added.
+    pub states: Vec<String>,
+}
+
+/// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("`{mechanism}` at `{slot}`: {reason}")]
+pub struct RewriteError {
+    /// The mechanism.
+    pub mechanism: &'static str,
+    /// The slot.
+    pub slot: String,
+    /// What is wrong.
+    pub reason: String,
+}
+
+/// Most joint points of the shape grids.
+const MOST_STARTS: usize = 96;
+
+impl Rewritten {
+    /// Every joint point of the shape grids, as (name, value) pairs; one empty point where there is no shape.
+    ///
+    /// Where there would be more than 96 points the longest grids are thinned first.
+    pub fn starts(&self) -> Vec<Vec<(String, f64)>> {
+        let mut grids: Vec<(String, Vec<f64>)> = self.shapes.iter().map(|s| (s.name.clone(), s.grid.clone())).collect();
+        while grids.iter().map(|(_, g)| g.len().max(1)).product::<usize>() > MOST_STARTS {
+            let Some(longest) = grids.iter_mut().map(|(_, g)| g).max_by_key(|g| g.len()) else { break };
+            *longest = longest.iter().copied().step_by(2).collect();
+        }
+        let mut points = vec![Vec::new()];
+        for (name, grid) in grids {
+            let extended = points.iter().flat_map(|point: &Vec<(String, f64)>| {
+                grid.iter().map(|value| {
+                    let mut point = point.clone();
+                    point.push((name.clone(), *value));
+                    point
+                })
+            });
+            points = extended.collect();
+        }
+        points
+    }
+
+    /// The names of the parameters that the effect brought, fixed ones too.
+    pub fn parameters(&self, baseline: &Simulation) -> Vec<String> {
+        let new = self.simulation.parameters.iter().filter(|p| baseline.parameter(&p.name).is_none());
+        new.map(|p| p.name.clone()).collect()
+    }
+}
+
+/// The law's own names and the names that they have in the simulation.
+struct Writer<'a> {
+    slot: &'a Slot,
+    own: BTreeMap<String, String>,
+}
+
+impl Writer<'_> {
+    fn text(&self, text: &str) -> Result<Expr, String> {
+        let parsed = Expr::parse(text).map_err(|e| format!("`{text}`: {e}"))?;
+        let mut unknown = None;
+        let written = parsed.map(&mut |e| match e {
+            Expr::Symbol(name) if name != "t" && name != "pi" => {
+                if let Some(own) = self.own.get(&name) {
+                    Expr::symbol(own)
+                } else if let Some(quantity) = self.slot.quantity(&name) {
+                    quantity.expression.clone()
+                } else {
+                    unknown = Some(name.clone());
+                    Expr::Symbol(name)
+                }
+            }
+            other => other,
+        });
+        match unknown {
+            Some(name) => Err(format!("`{text}` uses `{name}`, which is not offered here")),
+            None => Ok(written.simplified()),
+        }
+    }
+}
+
+/// The unit of a measure at a slot, its factors in the order in which they are printed.
+fn unit_of_measure(slot: &Slot, measure: &Expr) -> Option<Unit> {
+    Unit::parse(&product_of_units(slot, measure)?.to_string()).ok()
+}
+
+fn product_of_units(slot: &Slot, measure: &Expr) -> Option<Unit> {
+    use hysid_plant::BinaryOp::{Div, Mul, Pow};
+    match measure {
+        Expr::Number(_) => Some(Unit::none()),
+        Expr::Symbol(s) if matches!(s.as_str(), "t" | "T" | "h") => Unit::parse("s").ok(),
+        Expr::Symbol(s) => slot.quantity(s)?.unit.clone(),
+        Expr::Binary(Mul, a, b) => Some(product_of_units(slot, a)?.times(&product_of_units(slot, b)?)),
+        Expr::Binary(Div, a, b) => Some(product_of_units(slot, a)?.per(&product_of_units(slot, b)?)),
+        Expr::Binary(Pow, a, b) => match **b {
+            Expr::Number(n) if n == 0.5 => product_of_units(slot, a)?.root(),
+            Expr::Number(n) if n.fract() == 0.0 && n.abs() < 9.0 => Some(product_of_units(slot, a)?.power(n as i32)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// The law's text at its target.
+fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Writer<'_>) -> Result<(), String> {
+    match (&slot.target, change) {
+        (Target::Symbol(symbol), Change::Replace(text)) => {
+            let by = writer.text(text)?;
+            simulation.map_equations(|e| e.substitute(symbol, &by));
+            Ok(())
+        }
+        (Target::Output(column), Change::Replace(text)) => {
+            let by = writer.text(text)?;
+            let output = simulation.output_mut(column).ok_or("the output is gone")?;
+            output.expression = by;
+            Ok(())
+        }
+        (Target::Output(column), Change::Force(text) | Change::Drive(text)) => {
+            let force = writer.text(text)?;
+            let output = simulation.output_mut(column).ok_or("the output is gone")?;
+            output.expression = output.expression.clone() + force;
+            Ok(())
+        }
+        (Target::Derivatives(states), Change::Force(text) | Change::Drive(text) | Change::Outflow(text)) => {
+            let force = writer.text(text)?;
+            let resists = if matches!(change, Change::Drive(_)) { -1.0 } else { 1.0 };
+            for (name, sign) in states {
+                let derivative = simulation.state(name).ok_or("the state is gone")?.derivative.clone();
+                let joined = |sum: Expr| if sign * resists > 0.0 { sum - force.clone() } else { sum + force.clone() };
+                let written = match force_path(simulation, &derivative) {
+                    ForcePath::Quotient(above, below) => joined(above.clone()) / below.clone(),
+                    ForcePath::Divided(mass) => {
+                        let rate = force.clone() / mass.clone();
+                        let sum = derivative.clone();
+                        if sign * resists > 0.0 { sum - rate } else { sum + rate }
+                    }
+                    ForcePath::Bare => joined(derivative.clone()),
+                };
+                if let Some(state) = simulation.state_mut(name) {
+                    state.derivative = written;
+                }
+            }
+            Ok(())
+        }
+        (Target::Derivatives(states), Change::Inertia { force, mass }) => {
+            let (force, more) = (writer.text(force)?, writer.text(mass)?);
+            for (name, _) in states {
+                let derivative = simulation.state(name).ok_or("the state is gone")?.derivative.clone();
+                let written = match force_path(simulation, &derivative) {
+                    ForcePath::Quotient(above, below) => {
+                        (above.clone() - force.clone()) / (below.clone() + more.clone())
+                    }
+                    ForcePath::Divided(mass) => {
+                        (derivative.clone() - force.clone() / mass.clone())
+                            / (Expr::Number(1.0) + more.clone() / mass.clone())
+                    }
+                    ForcePath::Bare => (derivative.clone() - force.clone()) / (Expr::Number(1.0) + more.clone()),
+                };
+                if let Some(state) = simulation.state_mut(name) {
+                    state.derivative = written;
+                }
+            }
+            Ok(())
+        }
+        _ => Err("this kind of law cannot stand at this kind of slot".to_owned()),
+    }
+}
+
+impl Mechanism {
+    /// The simulation with this mechanism at a slot.
+    ///
+    /// Amplitudes and shapes are scaled by what is known of the slot's signals. Names that the simulation already uses get a
+    /// number, so that a simulation can be rewritten again and again. With [`Purpose::Screening`] every amplitude at zero is
+    /// the baseline bit for bit; with [`Purpose::Refit`] the values of [`Rewritten::neutral`] are.
+    ///
+    /// # Errors
+    /// A law that does not fit its slot: the conformance suite holds that this does not happen for the slots that
+    /// [`Mechanism::slots`] gives.
+    pub fn rewrite(
+        &self,
+        simulation: &Simulation,
+        slot: &Slot,
+        signals: &Signals,
+        purpose: Purpose,
+    ) -> Result<Rewritten, RewriteError> {
+        let law = (self.law)(slot, purpose);
+        write_law(simulation, slot, signals, &law, purpose).map_err(|reason| RewriteError {
+            mechanism: self.id,
+            slot: slot.label.clone(),
+            reason,
+        })
+    }
+}
+
+fn write_law(
+    simulation: &Simulation,
+    slot: &Slot,
+    signals: &Signals,
+    law: &Law,
+    purpose: Purpose,
+) -> Result<Rewritten, String> {
+    let mut written = simulation.clone();
+    let mut writer = Writer { slot, own: BTreeMap::new() };
+    let mut amplitudes = Vec::new();
+    let mut shapes = Vec::new();
+    let mut neutral = Vec::new();
+    for parameter in &law.parameters {
+        let measure = Expr::parse(&parameter.measure).map_err(|e| format!("`{}`: {e}", parameter.measure))?;
+        let size = signals.size_of(&measure).filter(|s| s.is_finite() && *s > 0.0).unwrap_or(1.0);
+        let name = written.fresh_symbol(&parameter.name);
+        writer.own.insert(parameter.name.clone(), name.clone());
+        let mut new = Parameter::new(&name, 0.0);
+        new.unit = unit_of_measure(slot, &measure);
+        match &parameter.role {
+            Role::Amplitude => {
+                let (low, high) = parameter.range.unwrap_or((-1.0, 1.0));
+                new = new.within(low * size, high * size);
+                amplitudes.push(Amplitude { name: name.clone(), size });
+            }
+            Role::Shape(grid) => {
+                let mut values = signals.values(grid, size);
+                let (low, high) = match parameter.range {
+                    Some((low, high)) => (low * size, high * size),
+                    None => signals.bounds(grid, &values),
+                };
+                values.iter_mut().for_each(|v| *v = v.clamp(low, high));
+                values.dedup();
+                new.value = values.get(values.len() / 2).copied().unwrap_or(size);
+                new = new.within(low, high);
+                shapes.push(Shape { name: name.clone(), grid: values });
+            }
+            Role::Constant(grid) => {
+                new.value = signals.values(grid, size).first().copied().unwrap_or(size);
+                new.fixed = true;
+            }
+        }
+        if let Some(value) = parameter.neutral {
+            neutral.push((name.clone(), value * size));
+        }
+        written.parameters.push(new);
+    }
+    for state in &law.states {
+        let name = written.fresh_symbol(&state.name);
+        writer.own.insert(state.name.clone(), name.clone());
+        let measure = Expr::parse(&state.measure).map_err(|e| format!("`{}`: {e}", state.measure))?;
+        let like = |symbol: &str| match slot.quantity(symbol).map(|q| &q.expression) {
+            Some(Expr::Symbol(s)) => simulation.state(s).map(|s| s.initial.clone()),
+            _ => None,
+        };
+        let initial = match state.start {
+            Start::Zero => Initial::Number(0.0),
+            Start::Like(symbol) => like(symbol).unwrap_or(Initial::Number(0.0)),
+        };
+        written.states.push(State {
+            name,
+            derivative: Expr::Number(0.0),
+            initial,
+            unit: unit_of_measure(slot, &measure),
+        });
+    }
+    let mut states = Vec::new();
+    for state in &law.states {
+        let derivative = writer.text(&state.derivative)?;
+        if let Some(name) = writer.own.get(&state.name) {
+            states.push(name.clone());
+            if let Some(state) = written.state_mut(name) {
+                state.derivative = derivative;
+            }
+        }
+    }
+    enter(&mut written, slot, &law.change, &writer)?;
+    let mut report = Vec::new();
+    for parameter in law.parameters.iter().filter(|p| p.reported) {
+        let value = writer.text(&parameter.name)?;
+        let unit = Expr::parse(&parameter.measure).ok().and_then(|m| unit_of_measure(slot, &m));
+        report.push(Reported { name: parameter.name.clone(), unit, value });
+    }
+    for derived in &law.derived {
+        let unit = Expr::parse(&derived.measure).ok().and_then(|m| unit_of_measure(slot, &m));
+        report.push(Reported { name: derived.name.clone(), unit, value: writer.text(&derived.value)? });
+    }
+    if law.never_baseline {
+        neutral.clear();
+    } else if !amplitudes.is_empty() {
+        neutral.retain(|(name, _)| amplitudes.iter().any(|a| a.name == *name));
+    }
+    let linear = purpose == Purpose::Screening && !matches!(law.change, Change::Inertia { .. });
+    Ok(Rewritten { simulation: written, amplitudes, shapes, neutral, linear, report, states })
+}

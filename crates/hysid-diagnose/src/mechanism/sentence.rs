@@ -1,0 +1,76 @@
+//! The sentence for people, with values and units filled in.
+
+use hysid_plant::Unit;
+
+use super::Mechanism;
+use crate::slot::Slot;
+
+/// A reported number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Value {
+    /// The name in the report.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+    /// The unit, where the simulation settles it.
+    pub unit: Option<Unit>,
+}
+
+/// The number with three significant digits and its unit: `20.3 N`, `1.25e-5 m`, `0.3`.
+pub fn number_with_unit(value: f64, unit: Option<&Unit>) -> String {
+    let number = if value == 0.0 || !value.is_finite() {
+        format!("{value}")
+    } else if (1e-3..1e5).contains(&value.abs()) {
+        let digits = (2 - value.abs().log10().floor() as i32).max(0);
+        let text = format!("{value:.*}", digits as usize);
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.2e}")
+    };
+    match unit {
+        Some(unit) if !unit.is_none() => format!("{number} {unit}"),
+        _ => number,
+    }
+}
+
+impl Mechanism {
+    /// What to tell people: the values with their units, and where the effect is.
+    ///
+    /// A value that is not given is left out of the sentence together with its braces.
+    pub fn tell(&self, slot: &Slot, values: &[Value]) -> String {
+        let mut told = String::with_capacity(self.sentence.len() + 40);
+        let mut rest = self.sentence;
+        while let Some((before, after)) = rest.split_once('{') {
+            told.push_str(before);
+            let (name, behind) = after.split_once('}').unwrap_or((after, ""));
+            match name {
+                "place" | "parameter" => told.push_str(&slot.whereabouts),
+                _ => {
+                    if let Some(found) = values.iter().find(|v| v.name == name) {
+                        told.push_str(&number_with_unit(found.value, found.unit.as_ref()));
+                    }
+                }
+            }
+            rest = behind;
+        }
+        told.push_str(rest);
+        told
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits_and_a_unit() {
+        let newton = Unit::parse("N").unwrap();
+        let check = |value: f64, expected: &str| assert_eq!(number_with_unit(value, Some(&newton)), expected);
+        check(20.34, "20.3 N");
+        check(0.5, "0.5 N");
+        check(1234.5, "1234 N");
+        check(1.2345e-5, "1.23e-5 N");
+        check(0.0, "0 N");
+        check(-0.25, "-0.25 N");
+    }
+}

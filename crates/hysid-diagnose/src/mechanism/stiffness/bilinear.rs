@@ -1,0 +1,27 @@
+//! A spring whose stiffness changes at one point.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
+use crate::slot::Place;
+
+/// A spring whose stiffness changes at one point.
+pub static BILINEAR_STIFFNESS: Mechanism = Mechanism {
+    id: "bilinear_stiffness",
+    family: Family::AsymmetricStiffness,
+    block: Block::Restoring,
+    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    applies: |slot| slot.has("x"),
+    already: &["max(x, 0)", "max(0, x)", "max(x - P, 0)", "max(0, x - P)", "step(x)*x", "x*step(x)"],
+    law: |_, _| {
+        Law::force("k_b*max(x - x_0, 0)").amplitude("k_b", "F/x", -2.0, 50.0).shape(
+            "x_0",
+            "x",
+            Grid::SignedQuantiles("x", vec![0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9]),
+        )
+    },
+    contains: &[],
+    confusable: &["quadratic_stiffness", "gap_stop"],
+    needs: &[Need::BothSides("x")],
+    sentence: "The spring {place} changes its stiffness by {k_b} at {x_0}.",
+    signature: "Even and odd harmonics, sub-harmonics; a knee on one side.",
+    reference: "S. W. Shaw, P. J. Holmes, A periodically forced piecewise linear oscillator, J. Sound Vib. 90 (1983) 129-155",
+};

@@ -1,0 +1,30 @@
+//! A force that is periodic in the position, as of magnet poles or gear teeth.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_steps};
+use crate::slot::Place;
+
+/// A force that is periodic in the position, as of magnet poles or gear teeth.
+pub static COGGING: Mechanism = Mechanism {
+    id: "cogging",
+    family: Family::PositionRipple,
+    block: Block::Restoring,
+    places: &[Place::Force],
+    applies: |slot| slot.has("x") && slot.has("v"),
+    already: &["sin(2*pi*x/P)", "sin(2*pi/P*x)", "sin(P*x)", "sin(P*x + Q)"],
+    law: |_, _| {
+        Law::force("A_s*sin(2*pi*x/p_x) + A_c*cos(2*pi*x/p_x)")
+            .amplitude("A_s", "F", -1.0, 1.0)
+            .silent()
+            .amplitude("A_c", "F", -1.0, 1.0)
+            .silent()
+            .shape("p_x", "x", Grid::Reach("x", log_steps(0.05, 1.0, 40)))
+            .report("A", "F", "sqrt(A_s^2 + A_c^2)")
+            .report("phi", "1", "atan2(A_c, A_s)")
+    },
+    contains: &[],
+    confusable: &["stribeck_friction", "cubic_stiffness"],
+    needs: &[Need::Slow("v")],
+    sentence: "A force of {A} repeats every {p_x} of travel {place}; the simulation has none.",
+    signature: "Lines whose frequency follows the speed; periodic in the position.",
+    reference: "T. M. Jahns, W. L. Soong, Pulsating torque minimization techniques for permanent magnet AC motor drives, IEEE Trans. Ind. Electron. 43 (1996) 321-330",
+};

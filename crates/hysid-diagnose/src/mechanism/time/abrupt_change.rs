@@ -1,0 +1,27 @@
+//! A parameter that jumps at one moment.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, anywhere};
+use crate::slot::Place;
+
+/// A parameter that jumps at one moment.
+pub static ABRUPT_CHANGE: Mechanism = Mechanism {
+    id: "abrupt_change",
+    family: Family::TimeVariation,
+    block: Block::TimeVariation,
+    places: &[Place::Parameter],
+    applies: anywhere,
+    already: &["p*(1 + P*step(t - Q))"],
+    law: |_, _| {
+        Law::replace("p*(1 + delta*step(t - t_0))").amplitude("delta", "1", -0.95, 3.0).shape(
+            "t_0",
+            "t",
+            Grid::Times(24),
+        )
+    },
+    contains: &[],
+    confusable: &["parameter_drift"],
+    needs: &[Need::EarlyAndLate("y")],
+    sentence: "{parameter} jumps by the share {delta} at {t_0}; the simulation holds it constant.",
+    signature: "The residual begins at one moment; the cumulated scores have a kink there.",
+    reference: "M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes: Theory and Application, Prentice-Hall (1993)",
+};

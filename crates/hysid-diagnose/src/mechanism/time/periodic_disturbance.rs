@@ -1,0 +1,30 @@
+//! A force from outside that follows the clock.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, anywhere};
+use crate::slot::Place;
+
+/// A force from outside that follows the clock.
+pub static PERIODIC_DISTURBANCE: Mechanism = Mechanism {
+    id: "periodic_disturbance",
+    family: Family::ExternalDisturbance,
+    block: Block::Disturbance,
+    places: &[Place::Disturbance],
+    applies: anywhere,
+    already: &["sin(2*pi*P*t)", "sin(P*t)", "sin(P*t + Q)"],
+    law: |_, _| {
+        Law::drive("A_s*sin(2*pi*f_d*t) + A_c*cos(2*pi*f_d*t)")
+            .amplitude("A_s", "F", -1.0, 1.0)
+            .silent()
+            .amplitude("A_c", "F", -1.0, 1.0)
+            .silent()
+            .shape("f_d", "1/t", Grid::Peaks(24))
+            .report("A", "F", "sqrt(A_s^2 + A_c^2)")
+            .report("phi", "1", "atan2(A_c, A_s)")
+    },
+    contains: &[],
+    confusable: &["cogging"],
+    needs: &[Need::Turns(6)],
+    sentence: "A periodic disturbance of {A} at {f_d} acts {place}, whatever the input does.",
+    signature: "Coherent with the clock, neither with the input nor with the motion.",
+    reference: "M. Bodson, S. C. Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances with unknown frequency, Automatica 33 (1997) 2213-2221",
+};

@@ -1,0 +1,28 @@
+//! Creep that goes on for decades of time.
+
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, anywhere};
+use crate::slot::Place;
+
+/// Creep that goes on for decades of time.
+pub static LOG_CREEP: Mechanism = Mechanism {
+    id: "log_creep",
+    family: Family::LinearMemory,
+    block: Block::Hysteresis,
+    places: &[Place::Input, Place::Sensor],
+    applies: anywhere,
+    already: &["lag(u, P)", "lag(y, P)"],
+    law: |slot, _| {
+        // The logarithm of time as three relaxations, a decade apart.
+        let s = if slot.place == Place::Sensor { "y" } else { "u" };
+        Law::replace(format!("{s} + gamma*(lag({s}, tau_1) + lag({s}, 10*tau_1) + lag({s}, 100*tau_1) - 3*{s})"))
+            .amplitude("gamma", "1", -0.3, 0.3)
+            .shape("tau_1", "T", Grid::Values(vec![0.001, 0.003, 0.01]))
+            .within(0.0001, 0.1)
+    },
+    contains: &[],
+    confusable: &["sensor_drift", "parameter_drift", "viscoelastic"],
+    needs: &[Need::Rest("u")],
+    sentence: "The response {place} creeps on for decades of time: {gamma} per decade.",
+    signature: "A slow drift after every step, equal in each decade of time.",
+    reference: "H. Jung, D.-G. Gweon, Creep characteristics of piezoelectric actuators, Rev. Sci. Instrum. 71 (2000) 1896-1900",
+};

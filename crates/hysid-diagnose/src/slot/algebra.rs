@@ -1,0 +1,87 @@
+//! The little algebra that finds masses, stiffnesses and offsets in the equations.
+
+use hysid_plant::{BinaryOp, Expr, Simulation};
+
+/// The coefficient of `symbol` in an expression that is linear in it; `None` where it does not occur or not linearly.
+fn coefficient(expr: &Expr, symbol: &str) -> Option<Expr> {
+    if !expr.uses(symbol) {
+        return None;
+    }
+    match expr {
+        Expr::Symbol(_) => Some(Expr::Number(1.0)),
+        Expr::Neg(a) => coefficient(a, symbol).map(|c| -c),
+        Expr::Binary(op, a, b) => match (op, a.uses(symbol), b.uses(symbol)) {
+            (BinaryOp::Add | BinaryOp::Sub, true, false) => coefficient(a, symbol),
+            (BinaryOp::Add, false, true) => coefficient(b, symbol),
+            (BinaryOp::Sub, false, true) => coefficient(b, symbol).map(|c| -c),
+            (BinaryOp::Add, true, true) => Some(coefficient(a, symbol)? + coefficient(b, symbol)?),
+            (BinaryOp::Sub, true, true) => Some(coefficient(a, symbol)? - coefficient(b, symbol)?),
+            (BinaryOp::Mul, true, false) => coefficient(a, symbol).map(|c| c * (**b).clone()),
+            (BinaryOp::Mul, false, true) => coefficient(b, symbol).map(|c| (**a).clone() * c),
+            (BinaryOp::Div, true, false) => coefficient(a, symbol).map(|c| c / (**b).clone()),
+            _ => None,
+        },
+        Expr::Number(_) | Expr::Call(..) | Expr::Memory(..) => None,
+    }
+}
+
+/// The sum of the constant coefficients of `symbol` over the terms of a sum; terms that are not linear in it are left out.
+/// `None` where no term is linear in it with a coefficient of parameters only.
+pub(crate) fn linear_coefficient(simulation: &Simulation, expr: &Expr, symbol: &str) -> Option<Expr> {
+    let constant = |c: &Expr| !c.has_memory() && only_parameters(simulation, c);
+    let found = expr.terms().into_iter().filter_map(|(sign, term)| {
+        let c = coefficient(term, symbol)?.simplified();
+        constant(&c).then_some(if sign < 0.0 { -c } else { c })
+    });
+    found.reduce(|a, b| a + b).map(|c| c.simplified())
+}
+
+/// Whether every symbol is a parameter (or `pi`).
+pub(crate) fn only_parameters(simulation: &Simulation, expr: &Expr) -> bool {
+    expr.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some())
+}
+
+/// An expression for the size of a sum: the sum of the absolute values of its terms.
+pub(crate) fn size(expr: &Expr) -> Expr {
+    let terms = expr.terms().into_iter().map(|(_, term)| term.clone().abs());
+    terms.reduce(|a, b| a + b).unwrap_or(Expr::Number(0.0))
+}
+
+/// Whether a term of the sum is made of estimated parameters only: an offset that the fit already has.
+pub(crate) fn has_free_constant(simulation: &Simulation, expr: &Expr) -> bool {
+    let free = |name: &String| simulation.parameter(name).is_some_and(|p| !p.fixed);
+    expr.terms().into_iter().any(|(_, term)| only_parameters(simulation, term) && term.symbols().iter().any(free))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn simulation() -> Simulation {
+        Simulation::parse(include_str!("../mechanism/specimens/oscillator.sim.toml"), "oscillator").unwrap()
+    }
+
+    #[test]
+    fn coefficients_are_collected_over_the_terms() {
+        let check = |text: &str, expected: Option<&str>| {
+            let found = linear_coefficient(&simulation(), &Expr::parse(text).unwrap(), "x").map(|e| e.to_string());
+            assert_eq!(found.as_deref(), expected, "{text}");
+        };
+        check("u - k*x", Some("-k"));
+        check("u - k*(x - v)", Some("-k"));
+        check("u - k*x - c*x^3", Some("-k"));
+        check("x*k/m + c*x", Some("k/m + c"));
+        check("u - v*x", None);
+        check("u", None);
+    }
+
+    #[test]
+    fn an_offset_is_a_term_of_estimated_parameters() {
+        let check = |text: &str, expected: bool| {
+            assert_eq!(has_free_constant(&simulation(), &Expr::parse(text).unwrap()), expected, "{text}");
+        };
+        check("u - k*x - c", true);
+        check("u - k*x - 3", false);
+        check("u - k*x", false);
+    }
+}

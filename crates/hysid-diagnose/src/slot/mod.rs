@@ -1,0 +1,177 @@
+//! Slots: the places of a simulation at which something can be missing, found from its equations.
+//!
+//! A state `x` whose derivative is exactly the state `v` is a displacement with its velocity, and the derivative of `v` holds
+//! the force. Where that derivative is a quotient `(...)/m` by parameters, forces enter above the line and have the unit of a
+//! force; else they have the unit of the derivative. Two displacements that appear in each other's force are connected, and a
+//! law can stand between them. A state without a partner whose unit is a speed is a velocity without its displacement; any
+//! other is a store. A simulation without states is a static relation: its force laws stand at the output, over the inputs
+//! that are a displacement or a velocity by their unit or name (where there is only a displacement, the velocity is `d(x)`).
+
+mod algebra;
+mod find;
+mod pattern;
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
+
+use hysid_plant::{Expr, Simulation, Unit};
+
+pub use find::Structure;
+
+pub(crate) use find::{ForcePath, force_path};
+
+/// What kind of place a slot is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Place {
+    /// Before the plant: the input is replaced wherever it is used.
+    Input,
+    /// The force on a moving part, against the ground.
+    Force,
+    /// The force between two moving parts.
+    Connection,
+    /// The output of a static relation, as a force law.
+    ForceLaw,
+    /// A first-order state that holds something.
+    Store,
+    /// The measured output, as a sensor.
+    Sensor,
+    /// A parameter.
+    Parameter,
+    /// An external force or flow.
+    Disturbance,
+}
+
+/// Where a law's text ends up.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Target {
+    /// Taken from the derivatives of these states, each with its sign, above the line of a quotient by a mass.
+    Derivatives(Vec<(String, f64)>),
+    /// Added to this output.
+    Output(String),
+    /// Replaces this symbol in every equation.
+    Symbol(String),
+}
+
+/// A place of a simulation at which a mechanism can stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slot {
+    /// Its kind.
+    pub place: Place,
+    /// The name in `diagnosis.json`, as in `state:v`.
+    pub label: String,
+    /// Where it is, for people: `between x1 and x2`, `at the input u`.
+    pub whereabouts: String,
+    /// What the law's symbols stand for here.
+    symbols: BTreeMap<String, Quantity>,
+    pub(crate) target: Target,
+    /// What is looked through for a mechanism that is already there.
+    context: Vec<Expr>,
+    inputs: usize,
+    constant: bool,
+    loops: bool,
+}
+
+/// What a symbol of a law stands for at a slot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// The expression over the simulation's symbols.
+    pub expression: Expr,
+    /// Its unit, where the simulation settles it.
+    pub unit: Option<Unit>,
+}
+
+impl Display for Slot {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.label)
+    }
+}
+
+impl Slot {
+    fn new(place: Place, label: String, whereabouts: String, target: Target) -> Self {
+        Self {
+            place,
+            label,
+            whereabouts,
+            symbols: BTreeMap::new(),
+            target,
+            context: Vec::new(),
+            inputs: 0,
+            constant: false,
+            loops: false,
+        }
+    }
+
+    fn offer(&mut self, simulation: &Simulation, symbol: &str, expression: Expr) {
+        let unit = simulation.unit_of_expr(&expression);
+        self.symbols.insert(symbol.to_owned(), Quantity { expression, unit });
+    }
+
+    /// Whether a law can use this symbol here.
+    pub fn has(&self, symbol: &str) -> bool {
+        self.symbols.contains_key(symbol)
+    }
+
+    /// What a symbol stands for here.
+    pub fn quantity(&self, symbol: &str) -> Option<&Quantity> {
+        self.symbols.get(symbol)
+    }
+
+    /// All symbols that a law can use here, in alphabetical order.
+    pub fn symbols(&self) -> impl Iterator<Item = (&str, &Quantity)> {
+        self.symbols.iter().map(|(name, quantity)| (name.as_str(), quantity))
+    }
+
+    /// The number of inputs of the simulation, offered as `u_1`, `u_2`, ...
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Whether a parameter of its own is added to the force or to the output here: an offset.
+    pub fn has_constant(&self) -> bool {
+        self.constant
+    }
+
+    /// Whether a state of the simulation already has a loop in the velocity of this slot.
+    pub(crate) fn loops(&self) -> bool {
+        self.loops
+    }
+
+    /// The measure of a mass here: `m` where there is one, else a pure number.
+    pub(crate) fn mass_measure(&self) -> &'static str {
+        if self.has("m") { "m" } else { "1" }
+    }
+
+    /// Whether the mass depends on the motion.
+    pub(crate) fn mass_varies(&self) -> bool {
+        match (&self.target, self.quantity("x")) {
+            (Target::Derivatives(_), Some(x)) => self.context.iter().any(|e| {
+                matches!(e, Expr::Binary(hysid_plant::BinaryOp::Div, _, below)
+                    if x.expression.symbols().iter().any(|s| below.uses(s)))
+            }),
+            _ => false,
+        }
+    }
+
+    /// Whether the equations here contain an expression of this form. Symbols of the slot stand for what they are here, a
+    /// single capital letter for anything.
+    pub fn shows(&self, form: &str) -> bool {
+        let Some(form) = pattern::prepare(form, |s| self.symbols.get(s).map(|q| q.expression.clone())) else {
+            return false;
+        };
+        self.context.iter().any(|e| pattern::occurs(&form, e))
+    }
+
+    /// Whether the equations here contain a square root of an expression that uses this symbol.
+    pub(crate) fn shows_root(&self, symbol: &str) -> bool {
+        let Some(quantity) = self.symbols.get(symbol) else { return false };
+        let used = quantity.expression.symbols();
+        let mut found = false;
+        for e in &self.context {
+            e.visit(&mut |e| {
+                found |= matches!(e, Expr::Call(hysid_plant::Function::Sqrt, a)
+                    if a.iter().any(|a| used.iter().any(|s| a.uses(s))));
+            });
+        }
+        found
+    }
+}

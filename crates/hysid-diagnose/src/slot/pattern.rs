@@ -1,0 +1,109 @@
+//! Whether an equation contains an expression of a given form.
+
+use hysid_plant::{BinaryOp, Expr};
+
+/// No symbol of a simulation begins like this.
+const WILD: char = '?';
+
+/// The form as a tree: known symbols replaced, single capital letters turned into wildcards. `None` where the text is no
+/// expression or uses a symbol that is neither.
+pub(super) fn prepare(form: &str, known: impl Fn(&str) -> Option<Expr>) -> Option<Expr> {
+    let parsed = Expr::parse(form).ok()?;
+    let mut complete = true;
+    let prepared = parsed.map(&mut |e| match e {
+        Expr::Symbol(name) if name != "t" && name != "pi" => {
+            let mut letters = name.chars();
+            if let Some(expr) = known(&name) {
+                expr
+            } else if letters.next().is_some_and(|c| c.is_ascii_uppercase()) && letters.next().is_none() {
+                Expr::Symbol(format!("{WILD}{name}"))
+            } else {
+                complete = false;
+                Expr::Symbol(name)
+            }
+        }
+        other => other,
+    });
+    complete.then(|| prepared.simplified())
+}
+
+/// Whether any part of `expr` has this form.
+pub(super) fn occurs(form: &Expr, expr: &Expr) -> bool {
+    let mut found = false;
+    expr.visit(&mut |e| found = found || matches(form, e));
+    if found {
+        return true;
+    }
+    // A product of three is a tree of two: `c*v*abs(v)` holds `v*abs(v)` only after its factors are sorted out.
+    if let Expr::Binary(BinaryOp::Mul, ..) = form {
+        let wanted = factors(form);
+        expr.visit(&mut |e| {
+            found = found
+                || (matches!(e, Expr::Binary(BinaryOp::Mul | BinaryOp::Div, ..)) && contains(&wanted, &factors(e)))
+        });
+    }
+    found
+}
+
+/// The factors above the line of a product.
+fn factors(expr: &Expr) -> Vec<&Expr> {
+    match expr {
+        Expr::Binary(BinaryOp::Mul, a, b) => factors(a).into_iter().chain(factors(b)).collect(),
+        Expr::Binary(BinaryOp::Div, a, _) | Expr::Neg(a) => factors(a),
+        other => vec![other],
+    }
+}
+
+/// Whether every wanted factor finds one of its own.
+fn contains(wanted: &[&Expr], present: &[&Expr]) -> bool {
+    let mut left: Vec<&Expr> = present.to_vec();
+    wanted.iter().all(|form| match left.iter().position(|e| matches(form, e)) {
+        Some(at) => {
+            left.remove(at);
+            true
+        }
+        None => false,
+    })
+}
+
+fn matches(form: &Expr, expr: &Expr) -> bool {
+    match (form, expr) {
+        (Expr::Symbol(name), _) if name.starts_with(WILD) => true,
+        (Expr::Number(a), Expr::Number(b)) => a == b,
+        (Expr::Symbol(a), Expr::Symbol(b)) => a == b,
+        (Expr::Neg(a), Expr::Neg(b)) => matches(a, b),
+        (Expr::Binary(op, a, b), Expr::Binary(other, c, d)) if op == other => {
+            (matches(a, c) && matches(b, d))
+                || (matches!(op, BinaryOp::Add | BinaryOp::Mul) && matches(a, d) && matches(b, c))
+        }
+        (Expr::Call(f, a), Expr::Call(g, b)) => f == g && a.iter().zip(b).all(|(a, b)| matches(a, b)),
+        (Expr::Memory(f, a), Expr::Memory(g, b)) => f == g && a.iter().zip(b).all(|(a, b)| matches(a, b)),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_form_is_found_wherever_it_stands() {
+        let check = |form: &str, text: &str, expected: bool| {
+            let known = |s: &str| match s {
+                "x" => Some(Expr::parse("x1 - x2").unwrap()),
+                "v" => Some(Expr::symbol("v")),
+                _ => None,
+            };
+            let form = prepare(form, known).unwrap();
+            assert_eq!(occurs(&form, &Expr::parse(text).unwrap()), expected, "{text}");
+        };
+        check("sign(v)", "(u - c*v - F*sign(v))/m", true);
+        check("sign(v)", "(u - c*v)/m", false);
+        check("tanh(v/P)", "u - F*tanh(v/0.01)", true);
+        check("x^3", "u - a*(x1 - x2)^3", true);
+        check("v*abs(v)", "u - c*v*abs(v)", true);
+        check("v*abs(v)", "u - c*abs(v)*v", true);
+        check("abs(v)*Z", "v - abs(v)*z/g", true);
+        check("abs(v)*Z", "v - abs(v)", false);
+    }
+}
