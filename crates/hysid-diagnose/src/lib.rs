@@ -3,6 +3,7 @@
 pub mod evidence;
 pub mod file;
 pub mod mechanism;
+pub mod picture;
 mod random;
 pub mod refit;
 pub mod slot;
