@@ -4,6 +4,7 @@
 //! * [`require`] judges a recording against what a caller needs of it: a column that exists, that varies, that is long enough.
 //! * [`write_csv`], [`write_text`] and [`write_json`] put a file in place by a rename, so that no reader sees half of it.
 //! * [`read_versioned`] and [`write_versioned`] keep a `format_version` in every model file.
+//! * [`read_npy`] reads arrays that NumPy saved.
 //!
 //! Nothing here prints. In-memory types are not file formats: a crate that saves something converts it to a struct of its own.
 
@@ -12,6 +13,7 @@ mod chunks;
 mod clock;
 mod error;
 mod json;
+mod npy;
 mod read;
 pub mod require;
 mod write;
@@ -21,5 +23,6 @@ pub use chunks::{Chunk, CsvChunks};
 pub use clock::{ClockFit, fit_clock};
 pub use error::{InputError, InputProblem, WriteError};
 pub use json::{read_json, read_versioned, write_json, write_versioned};
+pub use npy::{Npy, NpyError, read_npy};
 pub use read::{LARGEST_VALUE, ReadOptions, TimeSource, read_recording};
 pub use write::{format_number, write_csv, write_recording, write_text};

@@ -1,1 +1,3 @@
 //! One file for each command: its arguments (`Args`), and `run`, which returns what went wrong as a [`crate::failure::Failure`].
+
+pub mod bench;
