@@ -19,7 +19,7 @@ pub struct DuhemParameters {
     pub rise: f64,
     /// Width of that step, in the unit of the input.
     pub width: f64,
-    /// Slope of the output right after a reversal, where it is on the curve (g): at most `slope`.
+    /// Slope of the output where it is on the curve (g): at most `slope`.
     pub g: f64,
 }
 

@@ -14,6 +14,8 @@
 
 mod baber_noori;
 mod bouc_wen;
+pub mod catalogue;
+pub mod conformance;
 mod dahl;
 mod differential;
 mod duhem;
