@@ -22,11 +22,15 @@ struct Cli {
 enum Command {
     #[command(hide = true)]
     Bench(commands::bench::Args),
+    Decimate(commands::decimate::Args),
+    Inspect(commands::inspect::Args),
 }
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Bench(args) => commands::bench::run(&args),
+        Command::Decimate(args) => commands::decimate::run(&args),
+        Command::Inspect(args) => commands::inspect::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

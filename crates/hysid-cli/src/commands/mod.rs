@@ -1,3 +1,6 @@
 //! One file for each command: its arguments (`Args`), and `run`, which returns what went wrong as a [`crate::failure::Failure`].
 
 pub mod bench;
+mod channel_facts;
+pub mod decimate;
+pub mod inspect;
