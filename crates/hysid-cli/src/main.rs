@@ -23,14 +23,18 @@ enum Command {
     #[command(hide = true)]
     Bench(commands::bench::Args),
     Decimate(commands::decimate::Args),
+    Fit(Box<commands::fit::Args>),
     Inspect(commands::inspect::Args),
+    Predict(commands::predict::Args),
 }
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Bench(args) => commands::bench::run(&args),
         Command::Decimate(args) => commands::decimate::run(&args),
+        Command::Fit(args) => commands::fit::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
+        Command::Predict(args) => commands::predict::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -8,6 +8,7 @@
 mod bank;
 mod derived;
 mod error;
+mod export;
 mod file;
 mod model;
 mod normal;

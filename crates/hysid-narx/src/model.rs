@@ -144,6 +144,13 @@ impl NarxModel {
         text
     }
 
+    /// The same model, made from recordings of which only the order of the samples is known.
+    #[must_use]
+    pub fn without_clock(mut self) -> Self {
+        self.parts.period_s = None;
+        self
+    }
+
     fn program(&self) -> Program {
         Program::new(&self.terms())
     }

@@ -1,1 +1,3 @@
 //! The facade: recipes that identify a model from recordings and diagnose a simulation against one.
+
+pub mod identify;

@@ -3,4 +3,6 @@
 pub mod bench;
 mod channel_facts;
 pub mod decimate;
+pub mod fit;
 pub mod inspect;
+pub mod predict;

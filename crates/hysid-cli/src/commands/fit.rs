@@ -1,0 +1,210 @@
+//! `hysid fit`: from recordings a compact model that free-runs.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use hysid::identify::{Criterion, Decimate, Factors, FitReport, Options, Source, identify};
+use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require};
+use hysid_signal::Recording;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::failure::Failure;
+
+/// Identify a model from recordings.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A recording to learn from (CSV); may be repeated.
+    #[arg(long = "recording", value_name = "CSV", required = true)]
+    recordings: Vec<PathBuf>,
+    /// The column of an input; may be repeated.
+    #[arg(long = "input", value_name = "COLUMN", required = true)]
+    inputs: Vec<String>,
+    /// The column of the output.
+    #[arg(long, value_name = "COLUMN")]
+    output: String,
+    /// A recording that is only used to judge the model (CSV); may be repeated.
+    #[arg(long = "holdout", value_name = "CSV")]
+    holdouts: Vec<PathBuf>,
+    /// The folder for model.json, fit.json and report.html.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Output lags 1 to N are candidates.
+    #[arg(long, value_name = "N")]
+    lags_output: Option<usize>,
+    /// Input lags up to N are candidates.
+    #[arg(long, value_name = "N")]
+    lags_input: Option<usize>,
+    /// The first input lag: 0 lets the present input u[n] be a candidate, 1 does not.
+    #[arg(long, value_name = "0|1")]
+    input_delay: Option<usize>,
+    /// The largest number of factors in a term.
+    #[arg(long, value_name = "D")]
+    degree: Option<usize>,
+    /// Sampling-rate reduction: auto, none, or a factor.
+    #[arg(long, value_name = "auto|none|L", default_value = "auto", value_parser = decimate)]
+    decimate: Decimate,
+    /// What terms are made of.
+    #[arg(long, value_name = "polynomial|hysteresis|auto", default_value = "auto", value_parser = factors)]
+    factors: Factors,
+    /// The number of terms: auto, or N.
+    #[arg(long, value_name = "auto|N", default_value = "auto", value_parser = terms)]
+    terms: AutoOr,
+    /// What decides the number of terms one step ahead; without it the free run on held-out blocks does.
+    #[arg(long, value_name = "press|aic|bic|err:X", value_parser = criterion)]
+    criterion: Option<Criterion>,
+    /// Number of threads; the result does not depend on it.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Seed of whatever is random.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Print fit.json on standard output instead of a summary.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A number, or left to the data.
+#[derive(Debug, Clone, Copy)]
+struct AutoOr(Option<usize>);
+
+fn decimate(text: &str) -> Result<Decimate, String> {
+    match text {
+        "auto" => Ok(Decimate::Auto),
+        "none" => Ok(Decimate::None),
+        _ => text.parse().map(Decimate::By).map_err(|_| "give auto, none or a whole number".into()),
+    }
+}
+
+fn factors(text: &str) -> Result<Factors, String> {
+    match text {
+        "auto" => Ok(Factors::Auto),
+        "polynomial" => Ok(Factors::Polynomial),
+        "hysteresis" => Ok(Factors::Hysteresis),
+        _ => Err("give polynomial, hysteresis or auto".into()),
+    }
+}
+
+fn terms(text: &str) -> Result<AutoOr, String> {
+    match text {
+        "auto" => Ok(AutoOr(None)),
+        _ => text.parse().map(|n| AutoOr(Some(n))).map_err(|_| "give auto or a whole number".into()),
+    }
+}
+
+fn criterion(text: &str) -> Result<Criterion, String> {
+    match text {
+        "press" => Ok(Criterion::Press),
+        "aic" => Ok(Criterion::Aic),
+        "bic" => Ok(Criterion::Bic),
+        _ => match text.strip_prefix("err:").map(str::parse) {
+            Some(Ok(e)) => Ok(Criterion::Err(e)),
+            _ => Err("give press, aic, bic or err: with a tolerance, as err:0.001".into()),
+        },
+    }
+}
+
+/// The clock's column where the file has it; without one, samples are counted in seconds.
+const TIME: &str = "t_s";
+
+/// Reads the named columns of a recording.
+pub(crate) fn read(path: &Path, columns: &[&str]) -> Result<Recording, Failure> {
+    let time = TimeSource::ColumnOrPeriod(TIME.into(), 1.0);
+    let options = ReadOptions { time, columns: Some(columns.iter().map(|c| (*c).to_string()).collect()) };
+    read_recording(path, &options).map_err(Failure::bad_input)
+}
+
+/// Whether the file has a time column.
+pub(crate) fn has_clock(path: &Path) -> Result<bool, Failure> {
+    let file = CsvChunks::open(path, None, 1).map_err(Failure::bad_input)?;
+    Ok(file.header().iter().any(|h| h == TIME))
+}
+
+/// Reads, checks, identifies, writes.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let options = Options {
+        lags_output: args.lags_output,
+        lags_input: args.lags_input,
+        input_delay: args.input_delay,
+        degree: args.degree,
+        decimate: args.decimate,
+        factors: args.factors,
+        terms: args.terms.0,
+        criterion: args.criterion.unwrap_or_default(),
+        seed: args.seed,
+    };
+    if let Some(problem) = options.problem() {
+        return Err(Failure::BadInput(problem));
+    }
+    let mut columns: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
+    columns.push(&args.output);
+    for (i, c) in columns.iter().enumerate() {
+        if columns[..i].contains(c) {
+            return Err(Failure::BadInput(format!("column `{c}` is given twice")));
+        }
+    }
+    let read_all = |paths: &[PathBuf]| paths.iter().map(|p| read(p, &columns)).collect::<Result<Vec<_>, _>>();
+    let (estimation, holdout) = (read_all(&args.recordings)?, read_all(&args.holdouts)?);
+    for recording in estimation.iter().chain(&holdout) {
+        require::varying(recording, &args.output).map_err(Failure::bad_input)?;
+    }
+    if args.out.exists() && !args.out.is_dir() {
+        return Err(Failure::BadInput(format!("{}: it is there and is not a folder", args.out.display())));
+    }
+    if args.threads == Some(0) {
+        return Err(Failure::BadInput("--threads is 0; it must be 1 or more".into()));
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.unwrap_or(0))
+        .build()
+        .map_err(|e| Failure::Internal(e.into()))?;
+    let bar = progress();
+    let source = Source { recordings: &estimation, inputs: &args.inputs, output: &args.output };
+    let found = pool.install(|| identify(source, &options, &|what| bar.set_message(what.to_string())));
+    bar.finish_and_clear();
+    let mut found = found.map_err(Failure::bad_input)?;
+    if !has_clock(&args.recordings[0])? {
+        found.model = found.model.without_clock();
+    }
+    let report = FitReport::new(&found, &estimation, &holdout, args.seed).map_err(Failure::bad_input)?;
+    std::fs::create_dir_all(&args.out)
+        .map_err(|e| Failure::BadInput(format!("{}: {e}", args.out.display())))?;
+    found.model.save(&args.out.join("model.json")).map_err(Failure::bad_input)?;
+    hysid_io::write_json(&args.out.join("fit.json"), &report.summary).map_err(Failure::bad_input)?;
+    if args.json {
+        let text = serde_json::to_string_pretty(&report.summary).map_err(|e| Failure::Internal(e.into()))?;
+        println!("{text}");
+    } else {
+        summary(&report);
+    }
+    for warning in &report.summary.warnings {
+        eprintln!("warning: {warning}");
+    }
+    Ok(())
+}
+
+/// A spinner on standard error that shows itself after a second.
+fn progress() -> ProgressBar {
+    let bar = ProgressBar::new_spinner();
+    bar.set_style(ProgressStyle::default_spinner());
+    bar.enable_steady_tick(Duration::from_secs(1));
+    bar
+}
+
+fn summary(report: &FitReport) {
+    let s = &report.summary;
+    println!("{}", s.equation);
+    for d in &s.derived {
+        println!("  where {d}");
+    }
+    println!("{} terms, every {} sample(s), output lags to {}, input lags {} to {}", s.terms.len(), s.decimation, s.lags.output, s.lags.input_delay, s.lags.input);
+    for ((free, one), linear) in s.free_run.iter().zip(&s.one_step).zip(&s.linear_free_run) {
+        let number = |x: Option<f64>| x.map_or("-".to_string(), |v| format!("{v:.4e}"));
+        let percent = |x: Option<f64>| x.map_or(String::new(), |v| format!(" ({:.2} % of std)", 100.0 * v));
+        let role = if free.role == hysid::identify::Role::Holdout { "hold-out" } else { "estimation" };
+        let diverged = free.diverged_at.map_or(String::new(), |n| format!("; DIVERGED at sample {n}"));
+        println!(
+            "{role} {}: free run {}{}{diverged}; one step {}; linear free run {}",
+            free.recording, number(free.rmse), percent(free.relative), number(one.rmse), number(linear.rmse)
+        );
+    }
+}

@@ -1,0 +1,3 @@
+//! The model in other notations: LaTeX for people, C and Python for machines.
+
+mod latex;
