@@ -166,8 +166,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         found.model = found.model.without_clock();
     }
     let report = FitReport::new(&found, &estimation, &holdout, args.seed).map_err(Failure::bad_input)?;
-    std::fs::create_dir_all(&args.out)
-        .map_err(|e| Failure::BadInput(format!("{}: {e}", args.out.display())))?;
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure::BadInput(format!("{}: {e}", args.out.display())))?;
     found.model.save(&args.out.join("model.json")).map_err(Failure::bad_input)?;
     hysid_io::write_json(&args.out.join("fit.json"), &report.summary).map_err(Failure::bad_input)?;
     if args.json {
@@ -196,7 +195,14 @@ fn summary(report: &FitReport) {
     for d in &s.derived {
         println!("  where {d}");
     }
-    println!("{} terms, every {} sample(s), output lags to {}, input lags {} to {}", s.terms.len(), s.decimation, s.lags.output, s.lags.input_delay, s.lags.input);
+    println!(
+        "{} terms, every {} sample(s), output lags to {}, input lags {} to {}",
+        s.terms.len(),
+        s.decimation,
+        s.lags.output,
+        s.lags.input_delay,
+        s.lags.input
+    );
     for ((free, one), linear) in s.free_run.iter().zip(&s.one_step).zip(&s.linear_free_run) {
         let number = |x: Option<f64>| x.map_or("-".to_string(), |v| format!("{v:.4e}"));
         let percent = |x: Option<f64>| x.map_or(String::new(), |v| format!(" ({:.2} % of std)", 100.0 * v));
@@ -204,7 +210,11 @@ fn summary(report: &FitReport) {
         let diverged = free.diverged_at.map_or(String::new(), |n| format!("; DIVERGED at sample {n}"));
         println!(
             "{role} {}: free run {}{}{diverged}; one step {}; linear free run {}",
-            free.recording, number(free.rmse), percent(free.relative), number(one.rmse), number(linear.rmse)
+            free.recording,
+            number(free.rmse),
+            percent(free.relative),
+            number(one.rmse),
+            number(linear.rmse)
         );
     }
 }

@@ -80,7 +80,9 @@ mod tests {
 
     #[test]
     fn numbers_and_symbols() {
-        for (x, expected) in [(1.5, "1.50000"), (0.012345678, "0.0123457"), (1234.5, "1234.50"), (2.5e-9, "2.50000\\cdot 10^{-9}")] {
+        for (x, expected) in
+            [(1.5, "1.50000"), (0.012345678, "0.0123457"), (1234.5, "1234.50"), (2.5e-9, "2.50000\\cdot 10^{-9}")]
+        {
             assert_eq!(number(x), expected);
         }
         assert_eq!(number(0.0), "0.00000");

@@ -27,10 +27,9 @@ impl Samples {
 /// The named columns of each recording.
 pub(crate) fn gather(recordings: &[Recording], inputs: &[String], output: &str) -> Result<Vec<Samples>, IdentifyError> {
     let column = |r: &Recording, name: &str| {
-        r.channel(name).map(|c| c.samples.clone()).ok_or_else(|| IdentifyError::MissingColumn {
-            recording: r.name().to_string(),
-            column: name.to_string(),
-        })
+        r.channel(name)
+            .map(|c| c.samples.clone())
+            .ok_or_else(|| IdentifyError::MissingColumn { recording: r.name().to_string(), column: name.to_string() })
     };
     recordings
         .iter()

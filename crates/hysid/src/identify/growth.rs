@@ -29,7 +29,12 @@ pub(crate) struct Budget {
 const NEEDED: f64 = 2e-4;
 
 /// The linear start of a family, refined; `None` where no stable one was found.
-pub(crate) fn start(trainer: &mut Trainer, family: &Family, search: &[Window], hold: &[Window]) -> Result<Option<Stage>, NarxError> {
+pub(crate) fn start(
+    trainer: &mut Trainer,
+    family: &Family,
+    search: &[Window],
+    hold: &[Window],
+) -> Result<Option<Stage>, NarxError> {
     let fit = trainer.least_squares(&family.linear, search)?;
     let Some(fit) = stabilised(trainer, fit, search)? else { return Ok(None) };
     let (fit, taught) = trainer.refine(fit, search, 20, Refine::Coefficients)?;

@@ -51,7 +51,9 @@ pub enum IdentifyError {
         value: f64,
     },
     /// Too short for the lags and parameters asked for.
-    #[error("the recordings have {samples} usable samples in a row at most; {needed} are needed for these lags and parameters")]
+    #[error(
+        "the recordings have {samples} usable samples in a row at most; {needed} are needed for these lags and parameters"
+    )]
     TooShort {
         /// Samples of the longest gap-free stretch.
         samples: usize,

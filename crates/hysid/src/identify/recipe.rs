@@ -52,7 +52,11 @@ const MOST_TERMS: usize = 25;
 ///
 /// # Errors
 /// [`IdentifyError`]: what is wrong with the recordings or the options.
-pub fn identify(source: Source<'_>, options: &Options, progress: &(dyn Fn(&str) + Sync)) -> Result<Identified, IdentifyError> {
+pub fn identify(
+    source: Source<'_>,
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Identified, IdentifyError> {
     if let Some(problem) = options.problem() {
         return Err(IdentifyError::Option(problem));
     }
@@ -74,7 +78,11 @@ impl Desk<'_> {
         let inputs: Vec<&str> = self.source.inputs.iter().map(String::as_str).collect();
         let base = Signals::from_columns(self.source.output, &inputs).map_err(hysid_narx::NarxError::from)?;
         let mut all = base.inputs().to_vec();
-        all.extend(derived.iter().map(|d| SignalName { symbol: d.symbol.clone(), column: d.symbol.clone(), threshold: 0.0 }));
+        all.extend(derived.iter().map(|d| SignalName {
+            symbol: d.symbol.clone(),
+            column: d.symbol.clone(),
+            threshold: 0.0,
+        }));
         Ok(Signals::new(base.output().clone(), all).map_err(hysid_narx::NarxError::from)?)
     }
 
@@ -107,7 +115,10 @@ impl Desk<'_> {
             };
             progress(&format!("linear models: lags {ny} and {nu}"));
             let Ok(Some(stage)) = start(&mut trainer, &family, &s.search, &s.hold) else { continue };
-            decisions.push(format!("linear, lags {ny} and {nu}: held-out free run {:.5e}, taught {:.5e}", stage.held.rmse, stage.taught.rmse));
+            decisions.push(format!(
+                "linear, lags {ny} and {nu}: held-out free run {:.5e}, taught {:.5e}",
+                stage.held.rmse, stage.taught.rmse
+            ));
             let hopeless = linear.last().is_some_and(|l| stage.held.rmse > 0.98 * l.2.held.rmse) && n > 5;
             linear.push((ny, nu, stage));
             if hopeless {
@@ -164,12 +175,23 @@ impl Desk<'_> {
             let t = std::time::Instant::now();
             let (fit, taught) = trainer.refine(stage.fit, &s.search, 8, Refine::Coefficients)?;
             let held = trainer.error(&fit, &s.hold)?;
-            let path = grow(&mut trainer, &family, Stage { fit, taught, held }, &s.search, &s.hold, budget, Refine::Coefficients)?;
+            let path = grow(
+                &mut trainer,
+                &family,
+                Stage { fit, taught, held },
+                &s.search,
+                &s.hold,
+                budget,
+                Refine::Coefficients,
+            )?;
             let lowest = path.iter().map(|p| p.held.rmse).fold(f64::INFINITY, f64::min);
             let Some(pick) = path.into_iter().find(|p| p.held.rmse <= 1.01 * lowest) else { continue };
             decisions.push(format!(
                 "{}: second look {} terms, held-out {:.5e} taught {:.5e}",
-                family.name, pick.fit.terms.len(), pick.held.rmse, pick.taught.rmse
+                family.name,
+                pick.fit.terms.len(),
+                pick.held.rmse,
+                pick.taught.rmse
             ));
             if chosen.as_ref().is_none_or(|c| pick.held.rmse < c.1.held.rmse) {
                 chosen = Some((family, pick));
@@ -185,7 +207,8 @@ impl Desk<'_> {
         decisions.push(format!("refined on everything: {:.5e}", error.rmse));
         let held_rmse = stage.held.rmse;
         let model = self.model(&mut trainer, fit, &whole)?;
-        let (lny, lnu, lstage) = linear.iter().min_by(|a, b| a.2.held.rmse.total_cmp(&b.2.held.rmse)).expect("checked above");
+        let (lny, lnu, lstage) =
+            linear.iter().min_by(|a, b| a.2.held.rmse.total_cmp(&b.2.held.rmse)).expect("checked above");
         let mut trainer = self.trainer(&[], lny.max(lnu) + 2)?;
         let whole = trainer.whole_windows();
         let (fit, _) = trainer.refine(lstage.fit.clone(), &whole, 10, Refine::Coefficients)?;
@@ -269,4 +292,3 @@ impl Desk<'_> {
         out
     }
 }
-

@@ -163,7 +163,8 @@ impl FitReport {
             let run = model.free_run(&record)?;
             let step = model.one_step(&record)?;
             let base = identified.linear.free_run(&record)?;
-            let line = |y: &[f64], diverged_at: Option<usize>| error_line(recording.name(), role, columns.y, y, diverged_at);
+            let line =
+                |y: &[f64], diverged_at: Option<usize>| error_line(recording.name(), role, columns.y, y, diverged_at);
             free.push(line(&run.y, run.diverged_at));
             one.push(line(&step, None));
             linear.push(line(&base.y, base.diverged_at));

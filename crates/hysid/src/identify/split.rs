@@ -101,7 +101,9 @@ mod tests {
 
     #[test]
     fn teaching_and_held_out_samples_do_not_meet() {
-        for whole in [vec![window(0, 1000)], vec![window(0, 300), window(1, 4000)], (0..9).map(|r| window(r, 120)).collect()] {
+        for whole in
+            [vec![window(0, 1000)], vec![window(0, 300), window(1, 4000)], (0..9).map(|r| window(r, 120)).collect()]
+        {
             let s = split(&whole, 5, 500);
             for h in &s.hold {
                 for t in s.teach.iter().filter(|t| t.record == h.record) {
