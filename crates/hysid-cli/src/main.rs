@@ -26,6 +26,7 @@ enum Command {
     Fit(Box<commands::fit::Args>),
     Inspect(commands::inspect::Args),
     Predict(commands::predict::Args),
+    Generate(commands::generate::Args),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
         Command::Fit(args) => commands::fit::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Predict(args) => commands::predict::run(&args),
+        Command::Generate(args) => commands::generate::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -6,3 +6,4 @@ pub mod decimate;
 pub mod fit;
 pub mod inspect;
 pub mod predict;
+pub mod generate;
