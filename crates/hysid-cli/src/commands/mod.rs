@@ -4,6 +4,6 @@ pub mod bench;
 mod channel_facts;
 pub mod decimate;
 pub mod fit;
+pub mod generate;
 pub mod inspect;
 pub mod predict;
-pub mod generate;
