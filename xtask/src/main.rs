@@ -1,5 +1,6 @@
 //! Tasks of this repository; `cargo xtask --help` lists them.
 
+mod catalogue;
 mod layers;
 mod prove;
 
@@ -17,6 +18,7 @@ struct Cli {
 /// One variant for each module beside this file.
 #[derive(Debug, Subcommand)]
 enum Task {
+    Catalogue(catalogue::Args),
     /// Check the house rules of `xtask/layers.toml`.
     Layers,
     Prove(prove::Args),
@@ -29,6 +31,7 @@ pub fn root() -> PathBuf {
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().task {
+        Task::Catalogue(args) => catalogue::run(&args),
         Task::Prove(args) => prove::run(&args),
         Task::Layers => {
             let found = layers::breaches(&root())?;

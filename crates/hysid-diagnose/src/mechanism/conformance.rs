@@ -1,11 +1,15 @@
 //! What every mechanism must satisfy, as a suite that can be run on any simulation.
 
+mod motion;
+
 use std::collections::BTreeMap;
 
 use hysid_plant::{Expr, Simulation};
 
 use super::{Mechanism, Purpose, Signals, Value, catalogue};
 use crate::slot::{Slot, Structure};
+
+pub use motion::{Bench, example_recording};
 
 /// Base simulations of every kind of plant that the catalogue knows.
 pub fn specimens() -> Vec<Simulation> {
@@ -165,6 +169,25 @@ pub fn check_simulation(simulation: &Simulation) -> Vec<Breach> {
         }
     }
     breaches
+}
+
+/// The specimens' sampling period in seconds and the size of their inputs: what moves each through its range.
+const EXCITATION: &[(f64, f64)] = &[
+    (0.02, 10.0),
+    (0.01, 60.0),
+    (0.01, 1.0),
+    (0.2, 2.0),
+    (5.0, 200.0),
+    (0.01, 40.0),
+    (0.01, 4.0),
+    (0.02, 1.0),
+    (0.01, 12.0),
+    (0.02, 6.0),
+];
+
+/// A bench for each specimen.
+pub fn benches() -> Vec<Bench> {
+    specimens().iter().zip(EXCITATION).filter_map(|(s, (period_s, size))| Bench::new(s, *period_s, *size)).collect()
 }
 
 #[cfg(test)]

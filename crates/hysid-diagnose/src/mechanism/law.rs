@@ -81,6 +81,8 @@ pub struct LawParameter {
     pub role: Role,
     /// Smallest and largest value: in multiples of the measure. `None`: taken from the grid.
     pub range: Option<(f64, f64)>,
+    /// A further lower bound: that many times another measure. Keeps a law within what the integration step can follow.
+    pub floor: Option<(String, f64)>,
     /// The value at which the rewritten simulation is the baseline whatever the others are, in multiples of the measure.
     pub neutral: Option<f64>,
     /// Whether it is reported under its own name.
@@ -179,6 +181,7 @@ impl Law {
             measure: measure.into(),
             role: Role::Amplitude,
             range: Some((low, high)),
+            floor: None,
             neutral: Some(0.0),
             reported: true,
         });
@@ -193,6 +196,7 @@ impl Law {
             measure: measure.into(),
             role: Role::Shape(grid),
             range: None,
+            floor: None,
             neutral: None,
             reported: true,
         });
@@ -207,6 +211,7 @@ impl Law {
             measure: measure.into(),
             role: Role::Constant(grid),
             range: None,
+            floor: None,
             neutral: None,
             reported: true,
         });
@@ -224,6 +229,13 @@ impl Law {
     #[must_use]
     pub fn within(self, low: f64, high: f64) -> Self {
         self.last(|p| p.range = Some((low, high)))
+    }
+
+    /// A further lower bound of the last parameter: `times` the size of another measure.
+    #[must_use]
+    pub fn at_least(self, times: f64, measure: &str) -> Self {
+        let floor = Some((measure.to_owned(), times));
+        self.last(|p| p.floor = floor)
     }
 
     /// The value of the last parameter at which the simulation is the baseline, in multiples of its measure.

@@ -17,6 +17,7 @@ mod page;
 mod rewrite;
 mod sentence;
 mod signals;
+mod survey;
 
 mod actuator;
 mod aero;
@@ -46,7 +47,8 @@ pub(crate) use law::{log_grid, log_steps};
 pub use page::catalogue_page;
 pub use rewrite::{Amplitude, Reported, RewriteError, Rewritten, Shape};
 pub use sentence::{Value, number_with_unit};
-pub use signals::Signals;
+pub use signals::{Signals, excited_band};
+pub use survey::{Stretch, SurveyError, survey};
 
 /// One entry of the catalogue.
 #[derive(Debug)]

@@ -118,3 +118,13 @@ fn entry(page: &mut String, mechanism: &Mechanism, structures: &[Structure]) {
     let _ = writeln!(page, "- told as: {}", mechanism.sentence);
     let _ = writeln!(page, "- {}", mechanism.reference);
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_page_in_the_documents_is_this_one() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/catalogue.md");
+        let written = std::fs::read_to_string(path).unwrap_or_default();
+        assert!(written == super::catalogue_page(), "docs/catalogue.md is stale: run `cargo xtask catalogue page`");
+    }
+}

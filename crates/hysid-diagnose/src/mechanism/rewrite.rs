@@ -272,10 +272,15 @@ fn write_law(
             }
             Role::Shape(grid) => {
                 let mut values = signals.values(grid, size);
-                let (low, high) = match parameter.range {
+                let (mut low, mut high) = match parameter.range {
                     Some((low, high)) => (low * size, high * size),
                     None => signals.bounds(grid, &values),
                 };
+                if let Some((measure, times)) = &parameter.floor {
+                    let floor = Expr::parse(measure).ok().and_then(|m| signals.size_of(&m));
+                    low = low.max(floor.map_or(low, |f| times * f));
+                    high = high.max(3.0 * low);
+                }
                 values.iter_mut().for_each(|v| *v = v.clamp(low, high));
                 values.dedup();
                 new.value = values.get(values.len() / 2).copied().unwrap_or(size);

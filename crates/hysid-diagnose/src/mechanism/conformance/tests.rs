@@ -23,3 +23,19 @@ fn every_mechanism_stands_somewhere_and_keeps_the_form() {
     let homeless: Vec<&str> = catalogue().iter().map(|m| m.id).filter(|id| !stands.contains(id)).collect();
     assert!(homeless.is_empty(), "no specimen has a slot for {homeless:?}");
 }
+
+#[test]
+fn neutral_values_are_the_baseline_and_every_amplitude_moves_an_output() {
+    let benches = benches();
+    assert_eq!(benches.len(), SPECIMENS.len());
+    let mut shown = Vec::new();
+    for bench in &benches {
+        for mechanism in catalogue() {
+            for (slot, signals) in bench.slots(mechanism) {
+                let found = bench.check_motion(mechanism, &slot, &signals);
+                shown.extend(found.into_iter().map(|b| format!("{}: {}: {}", b.mechanism, b.at, b.what)));
+            }
+        }
+    }
+    assert!(shown.is_empty(), "{} breaches:\n{}", shown.len(), shown.join("\n"));
+}

@@ -17,6 +17,7 @@ pub static BOUC_WEN: Mechanism = Mechanism {
             .amplitude("F_h", "F", -1.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 3.0, 5))
             .within(0.02, 20.0)
+            .at_least(0.8, "v*h")
             .shape("b", "1", Grid::Values(vec![0.5]))
             .within(0.3, 5.0)
             .shape("n_z", "1", Grid::Values(vec![1.0, 2.0]))

@@ -16,6 +16,7 @@ pub static DEGRADATION: Mechanism = Mechanism {
             .amplitude("F_h", "F", -1.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
             .within(0.02, 20.0)
+            .at_least(0.8, "v*h")
             .shape("d_nu", "x/(v*T)", Grid::Values(vec![0.5]))
             .within(0.0, 20.0)
             .shape("d_eta", "x/(v*T)", Grid::Values(vec![0.5]))

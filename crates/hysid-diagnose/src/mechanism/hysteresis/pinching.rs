@@ -16,6 +16,7 @@ pub static PINCHING: Mechanism = Mechanism {
             .amplitude("F_h", "F", -1.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
             .within(0.02, 20.0)
+            .at_least(0.8, "v*h")
             .shape("zeta_1", "1", Grid::Values(vec![0.6]))
             .within(0.0, 0.97)
             .shape("zeta_2", "1", Grid::Values(vec![0.2, 0.5]))

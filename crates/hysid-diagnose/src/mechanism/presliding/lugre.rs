@@ -16,6 +16,7 @@ pub static LUGRE_FRICTION: Mechanism = Mechanism {
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.03, 0.5, 3))
             .within(0.005, 5.0)
+            .at_least(0.6, "v*h")
             .shape("v_s", "v", log_grid(0.03, 0.5, 2))
             .within(0.005, 5.0)
             .shape("r_s", "1", Grid::Values(vec![0.5]))
