@@ -4,6 +4,7 @@
 //! printed again. Nothing here knows a mechanism: what is missing in a simulation is found elsewhere, by rewriting one
 //! `Simulation` into another.
 
+mod calibrate;
 mod dimension;
 mod document;
 mod engine;
@@ -12,8 +13,12 @@ mod expr;
 mod number;
 mod unit;
 
+pub use calibrate::{Calibration, CalibrationError, Data, Effort, Flag, NoiseModel, Settings};
 pub use document::{ClockSource, Hold, Initial, Input, Output, Parameter, Simulation, State, Time};
-pub use engine::{Compiled, DataError, Direction, Drive, Injection, Observer, Response, Run, Sensitivity, Slot, Start};
+pub use engine::{
+    Compiled, DataError, Direction, Drive, Injection, Linearisation, Observer, Response, Run, Sensitivity, Slot, Start,
+    StepCheck,
+};
 pub use error::{Error, ErrorKind, Place};
 pub use expr::{BinaryOp, Expr, ExprError, Function, Memory, is_legal_symbol};
 pub use unit::{Unit, UnitError};

@@ -542,6 +542,21 @@ impl<'a, N: Single> Machine<'a, N> {
         Some((high, surface))
     }
 
+    /// State derivatives and outputs at the start, each with its tangents.
+    pub fn beside(mut self) -> (Vec<(f64, Vec<f64>)>, Vec<(f64, Vec<f64>)>) {
+        let zero = N::lift(0.0);
+        let x = self.x.clone();
+        let mut flow = vec![zero; x.len()];
+        let mut outputs = vec![zero; self.model.outputs.len()];
+        let moment = self.moment(zero, zero, zero, Phase::Start);
+        self.moded_flow(&x, &moment, zero, &mut flow);
+        self.measure(&mut outputs);
+        let directions = self.directions;
+        let split =
+            |y: Vec<N>| y.iter().map(|y| (y.value(), (0..directions).map(|k| y.tangent(k)).collect())).collect();
+        (split(flow), split(outputs))
+    }
+
     /// Runs over all samples.
     pub fn run(mut self) -> (Response, Tangents) {
         let model = self.model;

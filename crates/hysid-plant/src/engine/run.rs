@@ -308,6 +308,13 @@ impl Compiled {
         Sensitivity { response: response.unwrap_or_else(|| self.simulate(run)), tangents }
     }
 
+    /// The states at the first sample for these parameters; free ones are 0.
+    pub(crate) fn first_states(&self, drive: &Drive, theta: &[f64]) -> Vec<f64> {
+        let one = drive.shortened(1);
+        let response = self.simulate(&Run::new(&one, theta));
+        response.states.iter().map(|s| s.first().copied().unwrap_or(f64::NAN)).collect()
+    }
+
     fn machine<N: Single>(&self, run: &Run<'_>, directions: &[Direction<'_>]) -> (Response, Tangents) {
         Machine::<N>::new(self, run, directions).run()
     }

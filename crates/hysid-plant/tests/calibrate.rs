@@ -1,0 +1,317 @@
+//! Calibration recovers what made the data, from wrong starts, under noise, in open and closed loop.
+
+mod common;
+
+use hysid_plant::{Compiled, Data, Drive, Effort, Flag, Run, Settings, Simulation, Start};
+use hysid_signal::{Excitation, white_noise};
+
+/// A simulation text and the true parameters of its data.
+struct Case {
+    name: &'static str,
+    text: &'static str,
+    truth: &'static [f64],
+    initial: &'static [f64],
+    input: fn(usize, f64) -> Vec<f64>,
+    noise: f64,
+    /// Largest relative error of a parameter.
+    allowed: f64,
+}
+
+fn multisine(n: usize, amplitude: f64) -> Vec<f64> {
+    let shape = Excitation::Multisine { lowest_hz: 0.1, highest_hz: 6.0, period: 0 };
+    shape.signal(n, 0.01, amplitude, 5).expect("valid")
+}
+
+fn steps(n: usize, amplitude: f64) -> Vec<f64> {
+    Excitation::Steps { hold: 60 }.signal(n, 0.01, amplitude, 3).expect("valid")
+}
+
+const RESONANT: &str = r#"
+[time]
+period_s = 0.01
+[inputs]
+u = "u_N"
+[parameters]
+m = { value = 2.6, min = 0.5, max = 8.0 }
+c = { value = 0.6, min = 0.01, max = 30.0 }
+k = { value = 140.0, min = 20.0, max = 2000.0 }
+[states]
+x = { derivative = "v", initial = "free" }
+v = { derivative = "(u - c*v - k*x)/m", initial = "free" }
+[outputs]
+x_m = "x"
+"#;
+
+const DRIVE: &str = r#"
+[time]
+period_s = 0.01
+hold = "zero"
+[inputs]
+u = "u_N"
+[parameters]
+m = { value = 1.4, min = 0.1, max = 20.0 }
+c = { value = 3.0, min = 0.0, max = 50.0 }
+F_c = { value = 0.5, min = 0.0, max = 20.0 }
+[states]
+x = { derivative = "v", initial = 0.0 }
+v = { derivative = "(u - c*v - F_c*sign(v))/m", initial = 0.0 }
+[outputs]
+x_m = "x"
+"#;
+
+const FIRST_ORDER: &str = r#"
+[time]
+period_s = 0.01
+[inputs]
+u = "u_V"
+[parameters]
+g = { value = 1.0, min = 0.0 }
+tau = { value = 0.6, min = 0.01, max = 10.0 }
+y0 = { value = 0.0, min = -1.0, max = 1.0 }
+[states]
+x = { derivative = "(g*u - x)/tau", initial = "free" }
+[outputs]
+y_C = "x + y0"
+"#;
+
+const STATIC: &str = r#"
+[time]
+period_s = 0.01
+[inputs]
+x = "x_mm"
+[parameters]
+c = { value = 0.1, min = -10.0, max = 50.0 }
+k = { value = 1.0, min = -50.0, max = 100.0 }
+F = { value = 0.2, min = 0.0, max = 200.0 }
+r = { value = 0.2, min = 0.0, max = 3.0 }
+[outputs]
+F_N = "c*d(x) + k*x + F*tanh(5*d(x)) + 4*play(x, r)"
+"#;
+
+const TWO_MASSES: &str = r#"
+[time]
+period_s = 0.01
+[inputs]
+u = "u_N"
+[parameters]
+m1 = { value = 1.5, min = 0.2, max = 8.0 }
+m2 = { value = 0.5, min = 0.1, max = 4.0 }
+c = { value = 0.8, min = 0.01, max = 30.0 }
+k1 = { value = 150.0, min = 20.0, max = 2000.0 }
+k2 = { value = 250.0, min = 20.0, max = 2000.0 }
+[states]
+x1 = { derivative = "v1", initial = 0.0 }
+v1 = { derivative = "(u - c*v1 - k1*x1 - k2*(x1 - x2))/m1", initial = 0.0 }
+x2 = { derivative = "v2", initial = 0.0 }
+v2 = { derivative = "(k2*(x1 - x2) - c*v2)/m2", initial = 0.0 }
+[outputs]
+x1_m = "x1"
+x2_m = "x2"
+"#;
+
+const CASES: &[Case] = &[
+    Case {
+        name: "resonant oscillator",
+        text: RESONANT,
+        truth: &[2.0, 1.2, 200.0],
+        initial: &[0.02, -0.1],
+        input: multisine,
+        noise: 0.02,
+        allowed: 0.03,
+    },
+    Case {
+        name: "friction drive",
+        text: DRIVE,
+        truth: &[2.0, 2.0, 1.5],
+        initial: &[],
+        input: steps,
+        noise: 0.01,
+        allowed: 0.06,
+    },
+    Case {
+        name: "first order",
+        text: FIRST_ORDER,
+        truth: &[2.5, 0.35, 0.15],
+        initial: &[0.4],
+        input: steps,
+        noise: 0.05,
+        allowed: 0.2,
+    },
+    Case {
+        name: "static",
+        text: STATIC,
+        truth: &[0.4, 2.0, 1.5, 0.5],
+        initial: &[],
+        input: multisine,
+        noise: 0.03,
+        allowed: 0.1,
+    },
+    Case {
+        name: "two masses",
+        text: TWO_MASSES,
+        truth: &[1.0, 0.7, 0.5, 200.0, 180.0],
+        initial: &[],
+        input: multisine,
+        noise: 0.02,
+        allowed: 0.05,
+    },
+];
+
+fn compile(text: &str) -> Compiled {
+    Compiled::new(&Simulation::parse(text, "case").unwrap_or_else(|e| panic!("{e}"))).expect("valid")
+}
+
+fn noisy(clean: &[f64], noise: f64, seed: u64) -> Vec<f64> {
+    let mean = clean.iter().sum::<f64>() / clean.len() as f64;
+    let variance = clean.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / clean.len() as f64;
+    let e = white_noise(clean.len(), noise * noise * variance, seed).expect("valid");
+    clean.iter().zip(e).map(|(y, e)| y + e).collect()
+}
+
+fn data(case: &Case, compiled: &Compiled, n: usize, seed: u64) -> Data {
+    let drive = Drive::new(0.0, 0.01, n, vec![(case.input)(n, 5.0)]).expect("valid");
+    let run = Run::new(&drive, case.truth).from(Start::Document(case.initial)).with_substeps(8);
+    let clean = compiled.simulate(&run);
+    assert_eq!(clean.diverged, None, "{}", case.name);
+    let measured = clean.outputs.iter().enumerate().map(|(j, y)| noisy(y, case.noise, seed + j as u64)).collect();
+    Data::new(compiled, case.name, drive, measured).expect("valid")
+}
+
+#[test]
+fn parameters_are_found_from_wrong_starts() {
+    for case in CASES {
+        let compiled = compile(case.text);
+        for seed in [1, 2] {
+            let data = data(case, &compiled, 2000, seed * 100);
+            let result = compiled.calibrate(std::slice::from_ref(&data), &Settings::default()).expect("calibrates");
+            for (i, (found, truth)) in result.theta.iter().zip(case.truth).enumerate() {
+                let error = (found - truth).abs() / truth.abs();
+                assert!(error < case.allowed, "{} seed {seed}, {i}: {found} for {truth}", case.name);
+            }
+            // The residual is the noise.
+            for (j, rmse) in result.rmse.iter().enumerate() {
+                let y = &data.measured[j];
+                let mean = y.iter().sum::<f64>() / y.len() as f64;
+                let rms = (y.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / y.len() as f64).sqrt();
+                assert!((0.9..1.1).contains(&(rmse / (case.noise * rms))), "{}: {}", case.name, rmse / rms);
+            }
+            let covered = result.estimated.iter().filter(|&&i| {
+                let (low, high) = result.interval(i).expect("estimated");
+                let slack = high - low;
+                (low - slack..high + slack).contains(&case.truth[i])
+            });
+            assert_eq!(covered.count(), case.truth.len(), "{}: intervals", case.name);
+        }
+    }
+}
+
+#[test]
+fn a_closed_loop_record_of_an_integrating_plant_calibrates() {
+    let compiled = compile(DRIVE);
+    let (m, c, friction) = (2.0, 2.0, 1.5);
+    // Position control by PD on a coarse Euler simulation of its own; the force is what was recorded.
+    let (n, fine) = (3000, 200);
+    let reference = |t: f64| 0.5 * (0.9 * t).sin() + 0.3 * (2.3 * t).sin();
+    let (mut x, mut v) = (0.0_f64, 0.0_f64);
+    let (mut u, mut y) = (Vec::new(), Vec::new());
+    let noise = white_noise(n, 1e-6, 11).expect("valid");
+    for (i, e) in noise.iter().enumerate() {
+        let measured = x + e;
+        let force = 60.0 * (reference(0.01 * i as f64) - measured) - 8.0 * v;
+        u.push(force);
+        y.push(measured);
+        for _ in 0..fine {
+            let h = 0.01 / fine as f64;
+            let pull = force - c * v;
+            let next =
+                if v == 0.0 && pull.abs() <= friction { 0.0 } else { v + h * (pull - friction * v.signum()) / m };
+            v = if v != 0.0 && next * v < 0.0 { 0.0 } else { next };
+            x += h * v;
+        }
+    }
+    let drive = Drive::new(0.0, 0.01, n, vec![u]).expect("valid");
+    let data = Data::new(&compiled, "loop", drive, vec![y]).expect("valid");
+    let result = compiled.calibrate(&[data], &Settings::default()).expect("calibrates");
+    for (found, truth) in result.theta.iter().zip([m, c, friction]) {
+        assert!((found - truth).abs() < 0.05 * truth, "{:?}", result.theta);
+    }
+    assert!(result.rmse[0] < 0.01, "{:?}", result.rmse);
+}
+
+#[test]
+fn coloured_noise_is_weighted_by_its_colour() {
+    let case = &CASES[0];
+    let compiled = compile(case.text);
+    let mut data = data(&Case { noise: 0.0, ..*case }, &compiled, 4000, 1);
+    let noise = hysid_signal::autoregressive_noise(&[0.95], 4000, 1e-6, 4).expect("valid");
+    data.measured[0].iter_mut().zip(&noise).for_each(|(y, e)| *y += e);
+    let result = compiled.calibrate(&[data], &Settings::default()).expect("calibrates");
+    let model = &result.noise[0];
+    assert!(!model.ar.is_empty() && (model.ar[0] + 0.95).abs() < 0.05, "{:?}", model.ar);
+    for (found, truth) in result.theta.iter().zip(case.truth) {
+        assert!((found - truth).abs() < 0.05 * truth, "{:?}", result.theta);
+    }
+}
+
+#[test]
+fn a_gap_splits_a_recording_and_missing_outputs_do_not_count() {
+    let case = &CASES[0];
+    let compiled = compile(case.text);
+    let whole = data(case, &compiled, 3000, 9);
+    let channel = |name: &str, samples: Vec<f64>| hysid_signal::Channel { name: name.to_owned(), samples };
+    let mut u = whole.drive.inputs()[0].clone();
+    let mut y = whole.measured[0].clone();
+    u[1500..1520].fill(f64::NAN);
+    y[400..430].fill(f64::NAN);
+    let clock = hysid_signal::Clock { start_s: 0.0, period_s: 0.01 };
+    let recording =
+        hysid_signal::Recording::new("gaps", clock, vec![channel("u_N", u), channel("x_m", y)]).expect("valid");
+    let parts = Data::from_recording(&compiled, &recording).expect("usable");
+    assert_eq!(parts.iter().map(|d| (d.offset, d.len())).collect::<Vec<_>>(), [(0, 1500), (1520, 1480)]);
+    let result = compiled.calibrate(&parts, &Settings::default()).expect("calibrates");
+    for (found, truth) in result.theta.iter().zip(case.truth) {
+        assert!((found - truth).abs() < 0.03 * truth, "{:?}", result.theta);
+    }
+    assert!(result.residuals[0][0][410].is_nan());
+}
+
+#[test]
+fn a_parameter_that_absorbs_missing_physics_is_flagged() {
+    // Strong dry friction in the data, none in the simulation: the damping takes it.
+    let compiled = compile(RESONANT);
+    let truth = compile(&RESONANT.replace("- k*x", "- k*x - 2.5*sign(v)"));
+    let drive = Drive::new(0.0, 0.01, 2000, vec![multisine(2000, 5.0)]).expect("valid");
+    let y = truth.simulate(&Run::new(&drive, &[2.0, 0.6, 200.0])).outputs;
+    let data = Data::new(&compiled, "friction", drive, y).expect("valid");
+    let result = compiled.calibrate(&[data], &Settings::default()).expect("calibrates");
+    assert!(
+        result.flags.iter().any(|f| matches!(f, Flag::FarFromUser { parameter: 1, .. })),
+        "{:?} {:?}",
+        result.theta,
+        result.flags
+    );
+}
+
+#[test]
+fn bounds_hold_and_are_flagged() {
+    let compiled = compile(&RESONANT.replace("max = 2000.0", "max = 180.0"));
+    let data = data(&Case { truth: &[2.0, 1.2, 200.0], ..CASES[0] }, &compiled, 2000, 1);
+    let result = compiled.calibrate(&[data], &Settings::default()).expect("calibrates");
+    assert!(result.theta.iter().zip(compiled.parameters()).all(|(t, p)| (p.lower()..=p.upper()).contains(t)));
+    let local = Settings { effort: Effort::Local, ..Settings::default() };
+    assert_ne!(local, Settings::default());
+}
+
+#[test]
+fn too_little_data_is_an_error() {
+    let compiled = compile(RESONANT);
+    let drive = Drive::new(0.0, 0.01, 4, vec![vec![1.0, 2.0, 1.0, 0.0]]).expect("valid");
+    let constant = Data::new(&compiled, "c", drive.clone(), vec![vec![1.0; 4]]).expect("valid");
+    let few = Data::new(&compiled, "f", drive, vec![vec![1.0, 2.0, 1.0, 3.0]]).expect("valid");
+    for (data, expected) in
+        [(vec![], "no data"), (vec![constant], "constant"), (vec![few], "4 measured samples cannot settle 5")]
+    {
+        let error = compiled.calibrate(&data, &Settings::default()).expect_err(expected).to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
