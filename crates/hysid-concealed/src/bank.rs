@@ -43,8 +43,7 @@ pub fn plan(stream: Stream, seed: u64, index: usize) -> Wanted {
 
 /// The next law from `at` on that may stand beside another.
 fn pairable(catalogue: &[Law], at: usize) -> Law {
-    let alone = [Law::Quantisation, Law::SolverArtefact];
-    (at..at + 3).map(|i| catalogue[i % catalogue.len()]).find(|l| !alone.contains(l)).unwrap_or(Law::Coulomb)
+    (at..at + 3).map(|i| catalogue[i % catalogue.len()]).find(|l| l.sociable()).unwrap_or(Law::Coulomb)
 }
 
 /// Case `index` of a bank; another law is drawn where the planned one cannot make the difficulty.

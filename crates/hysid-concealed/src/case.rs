@@ -190,6 +190,11 @@ impl Case {
         let val_noise = noise_kind.samples(random, length);
         let mut val = record(&design, &machine, &fresh, &val_noise, &tuned)?;
         add_noise(&mut val, &machine, noise_kind, &tuned.sigma, looped.then_some(&val_noise), random)?;
+        let turns_over = |r: &Record| r.clean[0].iter().any(|v| v.abs() > 2.6);
+        if kind == Kind::Pendulum && (turns_over(&est) || turns_over(&val)) {
+            // Past the top the motion is chaotic and no free run means anything.
+            return None;
+        }
         let louder = record(&design, &machine, &fresh.louder(1.5), &val_noise, &tuned);
         for record in [&mut est, &mut val] {
             for (column, clean) in record.y.iter_mut().zip(&tuned.y) {
@@ -227,7 +232,7 @@ impl Case {
             noise_level,
             sigma: tuned.sigma.clone(),
             bits,
-            dnr_asked: dnr,
+            dnr_asked: if law.fixed() { tuned.dnr } else { dnr },
             dnr: if control { 0.0 } else { tuned.dnr },
             effects: machine.effects.iter().map(|e| concealed(&design, e)).collect(),
             theta: names.iter().copied().zip(design.theta.iter().copied()).collect(),
@@ -263,13 +268,11 @@ fn companion(kind: Kind, have: &[Law], random: &mut Random) -> Option<Law> {
             || (hysteresis(a) && hysteresis(b))
             || (friction(a) && friction(b))
             || (a.place() == Place::Parameter && b.place() == Place::Parameter)
-            || a == Law::SolverArtefact
-            || b == Law::SolverArtefact
     };
     let list: Vec<Law> = Law::ALL
         .iter()
         .copied()
-        .filter(|l| !l.outside() && *l != Law::Quantisation && suits(kind, *l) && !have.iter().any(|h| clash(*h, *l)))
+        .filter(|l| l.sociable() && suits(kind, *l) && !have.iter().any(|h| clash(*h, *l)))
         .collect();
     (!list.is_empty()).then(|| random.pick(&list))
 }

@@ -312,7 +312,7 @@ impl Design {
             Law::Stribeck => {
                 vec![if drive { 0.0 } else { force }, force * r.uniform(0.4, 1.2), s.v * r.log_uniform(0.08, 0.4)]
             }
-            Law::LoadDependent => vec![r.uniform(0.5, 1.0)],
+            Law::LoadDependent => vec![force / s.u],
             Law::Dahl | Law::LuGre | Law::Elastoplastic => {
                 let size = if drive { self.theta[2] } else { force };
                 let z = s.q * if drive { 1.0 } else { r.log_uniform(0.03, 0.2) };
@@ -407,7 +407,7 @@ impl Design {
                 vec![0.2, fast, 8.0 * fast, 64.0 * fast]
             }
             Law::Quantisation => vec![s.y],
-            Law::Rectified => vec![1.0],
+            Law::Rectified => Vec::new(),
             Law::SensorDrift => vec![s.y / s.length * r.sign()],
             Law::BackEmf => vec![self.theta[1] * 2.0, 8.0 * s.period],
             Law::Leakage => vec![force / s.q.sqrt()],

@@ -102,7 +102,7 @@ laws! {
     LogCreep "log_creep" "linear_memory" Output 3 ["gamma", "tau_1", "tau_2", "tau_3"] [0];
     OutputSaturation "output_saturation" "sensor_nonlinearity" Output 0 ["limit"] [];
     Quantisation "quantisation" "sensor_nonlinearity" Output 0 ["lsb"] [0];
-    Rectified "rectified_output" "sensor_nonlinearity" Output 0 ["share"] [0];
+    Rectified "rectified_output" "sensor_nonlinearity" Output 0 [] [];
     SensorDrift "sensor_drift" "sensor_drift" Output 0 ["rate"] [0];
     BackEmf "back_emf" "electrical" Input 1 ["c_e", "tau_e"] [0, 1];
     Leakage "leakage" "storage" Plant 0 ["c_l"] [0];
@@ -139,6 +139,16 @@ impl Law {
     /// Whether the law takes the place of the plant's own dry friction.
     pub fn replaces_friction(self) -> bool {
         matches!(self, Law::Dahl | Law::LuGre | Law::Elastoplastic)
+    }
+
+    /// Whether the law is all or nothing, so that its difficulty cannot be set.
+    pub fn fixed(self) -> bool {
+        self == Law::Rectified
+    }
+
+    /// Whether the law may stand beside another in a case.
+    pub fn sociable(self) -> bool {
+        !matches!(self, Law::Quantisation | Law::SolverArtefact | Law::Rectified) && !self.outside()
     }
 
     /// Whether the catalogue has no such law.

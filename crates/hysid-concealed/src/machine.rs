@@ -430,19 +430,15 @@ impl<'a> Run<'a> {
             }
             // A sliding specimen: the imposed motion never rests, so that the sign is the whole law.
             law if law.sticks() && self.machine.kind.prescribed() => {
-                v.signum() * self.level(v.signum(), q, v, self.load(q))
+                v.signum() * self.level(v.signum(), q, v, self.load(t))
             }
             _ => 0.0,
         }
     }
 
-    /// What presses on the rubbing surface in load-dependent friction: the spring force.
-    fn load(&self, q: f64) -> f64 {
-        match &self.body {
-            Body::Chain(c) => c.k[self.rubbing] * q,
-            Body::Specimen(s) => s[1] * q,
-            _ => 0.0,
-        }
+    /// What presses on the rubbing surface in load-dependent friction: the drive.
+    fn load(&self, t: f64) -> f64 {
+        self.path.at(t)
     }
 
     /// The piece of a piecewise law: from the mode where there is one, else from the motion.
@@ -609,7 +605,7 @@ fn sensor(machine: &Machine, t: f64, mut y: f64) -> f64 {
             Law::OutputOffset => y += e.p[0],
             Law::SensorDrift => y += e.p[0] * t,
             Law::OutputSaturation => y = y.clamp(-e.p[0], e.p[0]),
-            Law::Rectified => y = (1.0 - e.p[0]) * y + e.p[0] * y.abs(),
+            Law::Rectified => y = y.abs(),
             Law::Quantisation => y = e.p[0] * (y / e.p[0]).round(),
             _ => {}
         }
@@ -636,7 +632,7 @@ impl Hybrid for Run<'_> {
                         (dx[j], dx[n + j]) = (0.0, 0.0);
                     } else {
                         let side = f64::from(mode[0]);
-                        dx[n + j] = (f[j] - side * self.level(side, q, v, self.load(q))) / m[j];
+                        dx[n + j] = (f[j] - side * self.level(side, q, v, self.load(t))) / m[j];
                     }
                 }
                 power = (c.c[0] * x[n].abs() + c.friction) * x[n].abs();
@@ -705,7 +701,7 @@ impl Hybrid for Run<'_> {
                     if mode[j] == 0 {
                         self.modulate(t, x);
                         let f = self.push(t, x, mode);
-                        self.level(f.signum(), q, 0.0, self.load(q)) - f.abs()
+                        self.level(f.signum(), q, 0.0, self.load(t)) - f.abs()
                     } else {
                         f64::from(mode[j]) * v
                     }
@@ -734,7 +730,7 @@ impl Hybrid for Run<'_> {
                     x[c.n + self.rubbing] = 0.0;
                 }
                 let f = self.push(t, x, mode);
-                let level = self.level(f.signum(), x[self.rubbing], 0.0, self.load(x[self.rubbing]));
+                let level = self.level(f.signum(), x[self.rubbing], 0.0, self.load(t));
                 mode[i] = if f.abs() > level { f.signum() as i8 } else { 0 };
             }
             Mode::Piece(effect) => {

@@ -237,7 +237,8 @@ pub fn solve(a: &[f64], b: &[f64], n: usize, lambda: f64) -> Option<Vec<f64>> {
                 sum -= l[i * n + k] * l[j * n + k];
             }
             if i == j {
-                if sum <= 1e-14 {
+                // The negated comparison also refuses NaN.
+                if !(sum > 1e-14 && sum.is_finite()) {
                     return None;
                 }
                 l[i * n + i] = sum.sqrt();
@@ -259,7 +260,8 @@ pub fn solve(a: &[f64], b: &[f64], n: usize, lambda: f64) -> Option<Vec<f64>> {
         }
         x[i] /= l[i * n + i];
     }
-    Some((0..n).map(|i| x[i] / d[i]).collect())
+    let x: Vec<f64> = (0..n).map(|i| x[i] / d[i]).collect();
+    x.iter().all(|v| v.is_finite()).then_some(x)
 }
 
 fn standard_errors(machine: &Machine, knobs: &[Knob], normal: &[f64], rms: f64) -> Vec<(usize, usize, f64)> {

@@ -82,6 +82,9 @@ pub fn spread(x: &[f64]) -> f64 {
 /// The machine at difficulty `dnr`. Several effects are first brought to equal difficulty one by one, then scaled together.
 /// `None` where no strength in range makes the difficulty.
 pub fn tune(design: &Design, source: &Source, units: &[Effect], dnr: f64, level: f64, noise: &[f64]) -> Option<Tuned> {
+    if units.iter().any(|e| e.law.fixed()) {
+        return measure(design, source, units, &vec![1.0; units.len()], level, noise, 15);
+    }
     let mut relative = vec![1.0; units.len()];
     if units.len() > 1 {
         let each = dnr / (units.len() as f64).sqrt();

@@ -1,0 +1,105 @@
+//! What the same recordings give without a diagnosis (recalibration), and with the truth known beforehand (the oracle).
+//!
+//! Errors are against the outputs without noise, in units of the noise, free run over the hold-out.
+
+use hysid_concealed::case::{Case, Group, Record};
+use hysid_concealed::design::{Source, suits};
+use hysid_concealed::law::Law;
+use hysid_concealed::machine::Machine;
+use hysid_concealed::refit::{Scope, Target, refit};
+use hysid_concealed::seed::{Random, Stream};
+
+use super::linear;
+use super::trial::distance;
+
+/// Errors of the competitors on one case.
+#[derive(Debug, Clone)]
+pub struct Rivals {
+    /// Baseline, recalibrated.
+    pub before: f64,
+    /// The true structure, refitted.
+    pub oracle: f64,
+    /// Linear black box (output-error model).
+    pub linear: f64,
+    /// The same at 1.5 times the amplitude.
+    pub linear_louder: Option<f64>,
+    /// For a law outside the catalogue: squared distance in units of the noise to the best law inside, after its refit.
+    pub separation: Option<f64>,
+}
+
+/// Samples that the search for the best rival law looks at.
+const LOOK: usize = 2000;
+
+/// Fits and runs the competitors.
+pub fn rivals(case: &Case) -> Rivals {
+    let baseline = case.design.baseline(&case.machine.effects);
+    let calibrated = fitted(case, &baseline, Scope::Plant);
+    let truth = fitted(case, &case.machine, Scope::Effects);
+    let black = linear::fit(&case.est);
+    let linear = |record: &Record| {
+        black.as_ref().map_or(f64::INFINITY, |b| distance(&b.run(&record.input), &record.clean, &case.label.sigma))
+    };
+    Rivals {
+        before: error(case, &calibrated, &case.val),
+        oracle: error(case, &truth, &case.val),
+        linear: linear(&case.val),
+        linear_louder: case.louder.as_ref().map(linear),
+        separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
+    }
+}
+
+fn fitted(case: &Case, start: &Machine, scope: Scope) -> Machine {
+    let target = Target { input: &case.est.input, y: &case.est.y };
+    refit(start, target, &case.label.sigma, scope, false, 12).map_or_else(|| start.clone(), |r| r.machine)
+}
+
+/// Free-run error of a machine on a record.
+pub fn error(case: &Case, machine: &Machine, record: &Record) -> f64 {
+    machine.run(&record.input, None).map_or(f64::INFINITY, |y| distance(&y, &record.clean, &case.label.sigma))
+}
+
+/// Squared distance from the outputs without noise to the best law of the catalogue.
+fn separation(case: &Case, calibrated: &Machine) -> f64 {
+    let n = case.est.input.len();
+    let clean = Target { input: &case.est.input, y: &case.est.clean };
+    let sigma = &case.label.sigma;
+    let all = |rms: f64| (n * case.est.clean.len()) as f64 * rms * rms;
+    let Some(plain) = refit(calibrated, clean, sigma, Scope::Plant, false, 8) else { return f64::NAN };
+    let mut best = all(plain.rms);
+    // The whole record decides only for short ones; the search over laws costs one refit each.
+    let rounds = if n > LOOK { 4 } else { 6 };
+    for law in Law::ALL.iter().filter(|l| !l.outside() && l.sociable() && suits(case.design.kind, **l)) {
+        if best < 25.0 || n > 4000 {
+            break;
+        }
+        let mut random = Random::for_case(Stream::Development, 0, 0);
+        let source = Source::Open(case.est.input.clone());
+        let Some(unit) = case.design.effect(*law, &source, &mut random) else { continue };
+        let signs: &[f64] = if either_sign(*law) { &[1.0, -1.0] } else { &[1.0] };
+        for sign in signs {
+            let mut machine = plain.machine.clone();
+            machine.effects = vec![unit.at(0.02 * sign)];
+            if let Some(r) = refit(&machine, clean, sigma, Scope::Effects, false, rounds) {
+                best = best.min(all(r.rms));
+            }
+        }
+    }
+    best
+}
+
+/// Laws whose strength may be negative.
+fn either_sign(law: Law) -> bool {
+    matches!(
+        law,
+        Law::Cubic
+            | Law::Quintic
+            | Law::QuadraticStiffness
+            | Law::Bilinear
+            | Law::InputPolynomial
+            | Law::InputOffset
+            | Law::OutputOffset
+            | Law::Drift
+            | Law::AbruptChange
+            | Law::SensorDrift
+    )
+}
