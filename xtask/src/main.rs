@@ -3,6 +3,7 @@
 mod catalogue;
 mod layers;
 mod prove;
+mod reproduce;
 
 use std::path::{Path, PathBuf};
 
@@ -22,6 +23,7 @@ enum Task {
     /// Check the house rules of `xtask/layers.toml`.
     Layers,
     Prove(prove::Args),
+    Reproduce(reproduce::Args),
 }
 
 /// The root of the workspace.
@@ -33,6 +35,7 @@ fn main() -> anyhow::Result<()> {
     match Cli::parse().task {
         Task::Catalogue(args) => catalogue::run(&args),
         Task::Prove(args) => prove::run(&args),
+        Task::Reproduce(args) => reproduce::run(&args),
         Task::Layers => {
             let found = layers::breaches(&root())?;
             anyhow::ensure!(found.is_empty(), "{}", found.join("\n"));
