@@ -105,8 +105,9 @@ impl Differential<1> for BoucWen {
     #[inline]
     fn derivative(&self, &[h]: &[f64; 1], _: f64, u_dot: f64) -> [f64; 1] {
         let BoucWenParameters { a, beta, gamma, n, .. } = self.parameters;
-        let p = power_below(h, n);
-        [a * u_dot - p * (beta * u_dot.abs() * h + gamma * u_dot * h.abs())]
+        let (bend, skew) = (beta * u_dot.abs() * h, gamma * u_dot * h.abs());
+        // The sums stand in the order of the shortest chain of operations from `h` to the result.
+        if n == 1.0 { [a * u_dot - bend - skew] } else { [a * u_dot - power_below(h, n) * (bend + skew)] }
     }
 
     #[inline]

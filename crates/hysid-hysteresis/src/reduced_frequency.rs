@@ -4,8 +4,8 @@
 //! `C_N = C_N0 + C_a(k) d + C_q(k) d' c/(2V)`, with `d = alpha - alpha0`, `k = omega c/(2V)`,
 //! `C_a = C_a_inf + D/(1 + k^2 T^2)`, `C_q = C_q_inf - D T/(1 + k^2 T^2)`. For any motion, not just one sine, that is a first-order
 //! lag: `tau x' = d - x`, `C_N = C_N0 + C_a_inf d + C_q_inf d' c/(2V) + D x` with `tau = T c/(2V)`: the form that is integrated
-//! here. Linear and rate-dependent: the loop vanishes as the motion slows down. Angles in rad. Reference: the linear unsteady
-//! model in Greenwell, Prog. Aerosp. Sci. 40 (2004) 249-273.
+//! here. Linear and rate-dependent: the loop vanishes as the motion slows down. Angles in rad. Reference: Greenwell, J. Aircr. 35
+//! (1998) 776-783, on how the derivatives depend on frequency.
 
 use crate::error::Check;
 use crate::{Differential, ParameterError};

@@ -6,8 +6,7 @@ use super::Weights;
 
 /// The weight of the relays in a triangle of the plane.
 ///
-/// A level is an input as the relays see it. The relays that go up at or below `rise(u)` are up after the input has risen to
-/// `u`; those that come down at or above `fall(u)` are down after it has fallen to `u`.
+/// A level is an input as the relays see it.
 pub trait Everett: Send + Sync {
     /// A level: ordered like the input.
     type Level: Copy + PartialOrd + Debug + Send + Sync;
@@ -15,17 +14,17 @@ pub trait Everett: Send + Sync {
     /// The level below every relay, and the level above.
     fn limits(&self) -> (Self::Level, Self::Level);
 
-    /// The level that an input reaches from below.
-    fn rise(&self, u: f64) -> Self::Level;
-
-    /// The level that an input reaches from above: at most `rise(u)`.
-    fn fall(&self, u: f64) -> Self::Level;
+    /// The levels that an input reaches from below and from above; the second is at most the first.
+    ///
+    /// They differ only where the input is exactly a threshold, which both a rise and a fall to it pass.
+    fn levels(&self, u: f64) -> (Self::Level, Self::Level);
 
     /// The weight of the relays that go up below the level `a` and come down at or above the level `b`: 0 where `b >= a`.
     fn triangle(&self, a: Self::Level, b: Self::Level) -> f64;
 
-    /// The weight of the relays without memory (equal thresholds) that are up at this input, where `triangle` has left them out.
-    fn without_memory(&self, u: f64) -> f64;
+    /// The weight of the relays without memory (equal thresholds) that are up at the level `risen` of [`Self::levels`], where
+    /// `triangle` has left them out.
+    fn without_memory(&self, risen: Self::Level) -> f64;
 
     /// The reversals (maximum, minimum), outermost first, that decaying reversals about the middle leave.
     fn demagnetised(&self) -> Vec<(Self::Level, Self::Level)>;
@@ -75,23 +74,17 @@ impl Everett for RelayTable {
     }
 
     #[inline]
-    fn rise(&self, u: f64) -> usize {
+    fn levels(&self, u: f64) -> (usize, usize) {
         // The quotient may be off by rounding; the thresholds themselves decide, as in the grid.
         let guess = (u - self.lower) * self.per_width + 0.5;
-        let mut level = (guess as usize).min(self.middles.len());
-        while self.middles.get(level).is_some_and(|middle| *middle <= u) {
-            level += 1;
+        let mut risen = (guess as usize).min(self.middles.len());
+        while self.middles.get(risen).is_some_and(|middle| *middle <= u) {
+            risen += 1;
         }
-        while level > 0 && self.middles[level - 1] > u {
-            level -= 1;
+        while risen > 0 && self.middles[risen - 1] > u {
+            risen -= 1;
         }
-        level
-    }
-
-    #[inline]
-    fn fall(&self, u: f64) -> usize {
-        let level = self.rise(u);
-        if level > 0 && self.middles[level - 1] == u { level - 1 } else { level }
+        (risen, if risen > 0 && self.middles[risen - 1] == u { risen - 1 } else { risen })
     }
 
     #[inline]
@@ -100,8 +93,8 @@ impl Everett for RelayTable {
     }
 
     #[inline]
-    fn without_memory(&self, u: f64) -> f64 {
-        self.diagonal[self.rise(u)]
+    fn without_memory(&self, risen: usize) -> f64 {
+        self.diagonal[risen]
     }
 
     fn demagnetised(&self) -> Vec<(usize, usize)> {
@@ -152,12 +145,9 @@ impl Everett for SmoothTable {
         (0.0, self.weights.cells() as f64)
     }
 
-    fn rise(&self, u: f64) -> f64 {
-        ((u - self.weights.lower) / self.weights.width).max(0.0).min(self.weights.cells() as f64)
-    }
-
-    fn fall(&self, u: f64) -> f64 {
-        self.rise(u)
+    fn levels(&self, u: f64) -> (f64, f64) {
+        let level = ((u - self.weights.lower) / self.weights.width).max(0.0).min(self.weights.cells() as f64);
+        (level, level)
     }
 
     fn triangle(&self, a: f64, b: f64) -> f64 {

@@ -110,9 +110,10 @@ impl<E: Everett> Operator for PreisachStaircase<E> {
     #[inline]
     fn step(&self, state: &mut Self::State, u: f64) -> f64 {
         // Whichever way the input went, the other of the two finds nothing to do.
-        self.rise(&mut state.corners, self.everett.rise(u));
-        self.fall(&mut state.corners, self.everett.fall(u));
+        let (risen, fallen) = self.everett.levels(u);
+        self.rise(&mut state.corners, risen);
+        self.fall(&mut state.corners, fallen);
         let up = state.corners.last().map_or(0.0, Corner::up);
-        self.scale.output(up + self.everett.without_memory(u))
+        self.scale.output(up + self.everett.without_memory(risen))
     }
 }
