@@ -2,8 +2,31 @@
 
 pub mod evidence;
 pub mod file;
+pub mod locate;
 pub mod mechanism;
 pub mod picture;
-mod random;
 pub mod refit;
 pub mod slot;
+pub mod verdict;
+
+mod base;
+mod bootstrap;
+mod calibrate;
+mod compose;
+mod data;
+mod error;
+mod hold;
+mod model;
+mod pipeline;
+mod random;
+mod region;
+mod report_values;
+mod screen;
+mod text;
+
+pub use bootstrap::{Ratio, ratio_of_rms, rms};
+pub use data::{DataSet, Stretch, held_out_blocks};
+pub use error::DiagnoseError;
+pub use model::{Model, Outputs, Unknown, Values};
+
+pub use pipeline::{Diagnosis, Hooks, Options, Request, diagnose};

@@ -10,6 +10,8 @@ pub struct FeatureGroup {
     pub columns: Vec<Vec<f64>>,
     /// Share of the first column's whitened response that the simulation's own parameters can absorb, from 0 to 1.
     pub concealment: f64,
+    /// Which response each column came from, and the upper triangular factor that makes the responses from the columns, row by row.
+    factor: Vec<(usize, Vec<f64>)>,
     /// Norm of the first column outside the tangent space, for a unit amplitude: with it a score becomes an amplitude.
     pub norm: f64,
 }
@@ -18,6 +20,7 @@ impl FeatureGroup {
     /// From responses to unit amplitudes, as stacks in the unit of the outputs. `None` when nothing is left outside the tangent space.
     pub fn new(responses: &[Vec<f64>], layout: &Layout, whitener: &Whitener, own: &Projector) -> Option<Self> {
         let mut projector = Projector::default();
+        let mut factor = Vec::new();
         let (mut concealment, mut norm) = (1.0, 0.0);
         for (i, response) in responses.iter().enumerate() {
             if response.iter().any(|x| !x.is_finite()) {
@@ -34,12 +37,22 @@ impl FeatureGroup {
                 concealment = (1.0 - after / before).clamp(0.0, 1.0);
                 norm = after.sqrt();
             }
-            projector.push(w);
+            let mut coefficients: Vec<f64> = projector.basis().iter().map(|q| dot(q, &w)).collect();
+            let inside: f64 = coefficients.iter().map(|c| c * c).sum();
+            if projector.push(w) {
+                coefficients.push((after - inside).max(0.0).sqrt());
+                factor.push((i, coefficients));
+            }
         }
         if projector.rank() == 0 {
             return None;
         }
-        Some(Self { columns: projector.basis().to_vec(), concealment, norm })
+        Some(Self { columns: projector.basis().to_vec(), concealment, factor, norm })
+    }
+
+    /// A group that is known by the norm of its first response only.
+    pub fn of_norm(norm: f64) -> Self {
+        Self { columns: Vec::new(), concealment: 0.0, factor: Vec::new(), norm }
     }
 
     /// Sum of squares of `r` along the columns.
@@ -47,12 +60,22 @@ impl FeatureGroup {
         self.columns.iter().map(|g| dot(g, r).powi(2)).sum()
     }
 
-    /// The amplitude of the first column that explains `r` best.
-    pub fn amplitude(&self, r: &[f64]) -> f64 {
-        match self.columns.first() {
-            Some(g) if self.norm > 0.0 => dot(g, r) / self.norm,
-            _ => 0.0,
+    /// The amplitudes of the `count` responses that explain `r` best; zero for responses without a column of their own.
+    pub fn amplitudes(&self, r: &[f64], count: usize) -> Vec<f64> {
+        let mut right: Vec<f64> = self.columns.iter().map(|g| dot(g, r)).collect();
+        let mut out = vec![0.0; count];
+        for c in (0..self.columns.len()).rev() {
+            let (response, coefficients) = &self.factor[c];
+            let diagonal = coefficients[c];
+            let a = if diagonal > 0.0 { right[c] / diagonal } else { 0.0 };
+            if let Some(o) = out.get_mut(*response) {
+                *o = a;
+            }
+            for (b, coefficient) in right.iter_mut().zip(coefficients).take(c) {
+                *b -= a * coefficient;
+            }
         }
+        out
     }
 }
 
@@ -87,7 +110,10 @@ mod tests {
         let g = FeatureGroup::new(&[vec![3.0, 4.0, 0.0, 0.0]], &layout, &w, &own).unwrap();
         assert!((g.concealment - 9.0 / 25.0).abs() < 1e-12);
         assert!((g.norm - 4.0).abs() < 1e-12);
-        assert!((g.amplitude(&[0.0, 8.0, 0.0, 0.0]) - 2.0).abs() < 1e-12);
+        assert!((g.amplitudes(&[0.0, 8.0, 0.0, 0.0], 1)[0] - 2.0).abs() < 1e-12);
+        let two = FeatureGroup::new(&[vec![0.0, 2.0, 1.0, 0.0], vec![0.0, 1.0, 3.0, 0.5]], &layout, &w, &own).unwrap();
+        let a = two.amplitudes(&[0.0, 2.0 * 3.0 - 1.0, 3.0 - 3.0, -0.5], 2);
+        assert!((a[0] - 3.0).abs() < 1e-12 && (a[1] + 1.0).abs() < 1e-12, "{a:?}");
         assert!(FeatureGroup::new(&[vec![3.0, 0.0, 0.0, 0.0]], &layout, &w, &own).is_none());
     }
 

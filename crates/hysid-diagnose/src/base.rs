@@ -1,0 +1,106 @@
+//! A calibrated simulation and its evidence space: what later steps look at and build upon.
+
+use hysid_plant::Simulation;
+
+use crate::data::DataSet;
+use crate::evidence::{Projector, Whitener, norm2};
+use crate::model::{Model, Values};
+use crate::refit::{Fit, LmOptions, Problem, levenberg_marquardt};
+
+/// Largest order of the noise models.
+pub const MAX_AR: usize = 16;
+
+/// A simulation fitted to a data set under a noise model of its own.
+#[derive(Debug)]
+pub struct Base<'d> {
+    /// The compiled simulation on the data.
+    pub model: Model<'d>,
+    /// The fit.
+    pub fit: Fit,
+    /// The noise of its residual.
+    pub whitener: Whitener,
+    /// Log likelihood of the residual under that noise, less half of `ln n` for each coefficient of the noise model.
+    pub log_likelihood: f64,
+}
+
+/// Fits a simulation from these values: alternately the unknowns under the noise model and the noise model on the residual.
+///
+/// The first round uses `whitener`, or white noise where there is none. `None` where the simulation diverges at the start.
+pub fn fit_simulation<'d>(
+    model: Model<'d>,
+    start: &Values,
+    whitener: Option<&Whitener>,
+    rounds: usize,
+    options: LmOptions,
+) -> Option<Base<'d>> {
+    let data = model.data();
+    let mut theta = model.theta(start);
+    let mut noise = match whitener {
+        Some(w) => w.clone(),
+        None => data.layout.fit_noise(&data.y, 0),
+    };
+    let mut fit = None;
+    for _ in 0..rounds.max(1) {
+        let f = levenberg_marquardt(&model, &theta, &data.layout, &noise, None, options)?;
+        theta.clone_from(&f.theta);
+        noise = data.layout.fit_noise(&f.residual, MAX_AR);
+        fit = Some(f);
+    }
+    let fit = fit?;
+    let log_likelihood = log_likelihood(data, &noise, &fit.residual);
+    Some(Base { model, fit, whitener: noise, log_likelihood })
+}
+
+/// Log likelihood of a residual under a noise model, up to a constant of the data set.
+pub fn log_likelihood(data: &DataSet, noise: &Whitener, residual: &[f64]) -> f64 {
+    let white = noise.apply(&data.layout, residual);
+    let coefficients: usize = noise.models.iter().map(|m| m.order()).sum();
+    -0.5 * norm2(&white) - noise.log_scale(&data.layout) - 0.5 * coefficients as f64 * (data.rows().max(2) as f64).ln()
+}
+
+impl Base<'_> {
+    /// The document with the fitted values.
+    pub fn document(&self) -> Simulation {
+        self.model.document(&self.fit.theta)
+    }
+
+    /// The fitted values by name.
+    pub fn values(&self) -> Values {
+        self.model.values(&self.fit.theta)
+    }
+
+    /// The projector off the whitened tangent space of all unknowns, and the whitened residual projected off it.
+    pub fn evidence(&self) -> (Projector, Vec<f64>) {
+        let layout = &self.model.data().layout;
+        let own = Projector::new(self.fit.jacobian.iter().map(|c| self.whitener.apply(layout, c)));
+        let mut r = self.whitener.apply(layout, &self.fit.residual);
+        own.remove(&mut r);
+        (own, r)
+    }
+
+    /// 95 % intervals of the parameters (not of initial values): name, value, low, high, whether at a bound.
+    pub fn intervals(&self) -> Vec<(String, f64, f64, f64, bool)> {
+        let data = self.model.data();
+        let k = self.fit.theta.len();
+        let white = self.whitener.apply(&data.layout, &self.fit.residual);
+        let variance = norm2(&white) / (data.rows().saturating_sub(k)).max(1) as f64;
+        let covariance = self.fit.covariance(&data.layout, &self.whitener, None, variance);
+        let bounds = self.model.bounds();
+        (0..k)
+            .filter_map(|i| {
+                let name = self.model.name_of(i)?.to_owned();
+                let x = self.fit.theta[i];
+                let half = 1.96 * covariance[i + k * i].max(0.0).sqrt();
+                Some((name, x, (x - half).max(bounds[i].0), (x + half).min(bounds[i].1), self.fit.at_bound[i]))
+            })
+            .collect()
+    }
+
+    /// Covariance of the unknowns, column-major.
+    pub fn covariance(&self) -> Vec<f64> {
+        let data = self.model.data();
+        let white = self.whitener.apply(&data.layout, &self.fit.residual);
+        let variance = norm2(&white) / (data.rows().saturating_sub(self.fit.theta.len())).max(1) as f64;
+        self.fit.covariance(&data.layout, &self.whitener, None, variance)
+    }
+}

@@ -1,0 +1,93 @@
+//! What can be wrong with the input of a diagnosis. Numerical events (a diverging candidate) are results and never come here.
+
+/// Bad input: what was given, and what is allowed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DiagnoseError {
+    /// There is nothing to estimate from.
+    #[error("no recording to estimate from: give at least one")]
+    NoRecording,
+    /// A column that the simulation names is not in the recording.
+    #[error("{recording}: there is no column `{column}`, which the simulation names; the columns are {available}")]
+    MissingColumn {
+        /// The recording.
+        recording: String,
+        /// The column.
+        column: String,
+        /// What there is.
+        available: String,
+    },
+    /// A recording with too few complete samples.
+    #[error("{recording}: {found} usable samples (rows with all inputs and an output); the simulation has {parameters} free parameters and initial states, and at least {needed} samples are needed")]
+    TooFewSamples {
+        /// The recording.
+        recording: String,
+        /// Usable samples.
+        found: usize,
+        /// Free parameters.
+        parameters: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// A measured output that never changes.
+    #[error("{recording}: column `{column}` is constant ({value}); a constant output cannot be diagnosed")]
+    ConstantOutput {
+        /// The recording.
+        recording: String,
+        /// The column.
+        column: String,
+        /// Its value.
+        value: f64,
+    },
+    /// Two recordings with different sampling periods.
+    #[error("{recording}: its sampling period is {found} s, that of {first} is {expected} s; one diagnosis needs one sampling period")]
+    OtherPeriod {
+        /// The recording.
+        recording: String,
+        /// Its period.
+        found: f64,
+        /// The first recording.
+        first: String,
+        /// Its period.
+        expected: f64,
+    },
+    /// The same file as estimation and hold-out.
+    #[error("{0}: given as --recording and as --holdout; the hold-out must be data that the estimation never sees")]
+    SameData(String),
+    /// The simulation cannot be used.
+    #[error("{file}: {problem}")]
+    Simulation {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// An output that nothing can change.
+    #[error("{file}: output `{column}` depends on no state, input or parameter; there is nothing to diagnose in it")]
+    DeadOutput {
+        /// The simulation file.
+        file: String,
+        /// The output.
+        column: String,
+    },
+    /// The simulation diverges for every start that was tried.
+    #[error("{file}: the simulation diverges on {recording} (at {at_s} s with the values in the file) and no set of parameters within the bounds was found where it does not")]
+    Explodes {
+        /// The simulation file.
+        file: String,
+        /// The recording.
+        recording: String,
+        /// When, in seconds on the recording's clock.
+        at_s: f64,
+    },
+    /// An option outside its range.
+    #[error("{option} is {given}; allowed is {allowed}")]
+    Option {
+        /// The option.
+        option: &'static str,
+        /// What was given.
+        given: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+}

@@ -1,0 +1,287 @@
+//! Screening: every mechanism at every slot, as a column in the evidence space of a calibrated simulation.
+//!
+//! A mechanism's feature is the derivative of the rewritten simulation's output by its amplitudes, at amplitude zero, for each point of its
+//! shape grid. The derivatives come from the same forward differentiation that calibrates the simulation, so a feature costs one run.
+
+use std::collections::BTreeMap;
+
+use hysid_plant::{Compiled, Expr, Output, Simulation};
+use rayon::prelude::*;
+
+use crate::base::Base;
+use crate::evidence::{FeatureGroup, Projector, norm2, score};
+use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, catalogue};
+use crate::model::{Model, Values};
+use crate::slot::{Slot, Structure};
+
+/// Points of a candidate whose columns take part in the mismatch test.
+pub const KEPT: usize = 6;
+
+/// One joint point of a candidate's shape grids.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// The shapes.
+    pub shapes: Vec<(String, f64)>,
+    /// Its columns in the evidence space; kept for a spread of at most [`KEPT`] points, chosen without looking at the residual.
+    pub group: Option<FeatureGroup>,
+    /// Share of its response that the simulation's own parameters absorb.
+    pub concealment: f64,
+    /// Norm of its first amplitude's response outside the tangent space.
+    pub norm: f64,
+    /// The amplitudes that explain the residual best, by name.
+    pub amplitudes: Vec<(String, f64)>,
+    /// Its score.
+    pub score: f64,
+}
+
+/// A mechanism at a slot.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The mechanism.
+    pub mechanism: &'static Mechanism,
+    /// The slot.
+    pub slot: Slot,
+    /// The simulation with it, in physical parameters.
+    pub refit: Rewritten,
+    /// The points of its shape grid, best score first.
+    pub points: Vec<Point>,
+    /// What the recording lacks for it to be seen.
+    pub lacking: Option<String>,
+}
+
+impl Candidate {
+    /// Its largest score.
+    pub fn score(&self) -> f64 {
+        self.points.first().map_or(f64::NEG_INFINITY, |p| p.score)
+    }
+
+    /// Share of its response that the simulation's own parameters absorb, at its best point.
+    pub fn concealment(&self) -> Option<f64> {
+        self.points.first().map(|p| p.concealment)
+    }
+}
+
+/// Values of expressions along a simulated trajectory: `[expression][stretch][sample]`.
+pub fn along(base: &Base<'_>, expressions: &[Expr]) -> Option<Vec<Vec<Vec<f64>>>> {
+    let mut probe: Simulation = base.model.simulation().clone();
+    probe.outputs = expressions
+        .iter()
+        .enumerate()
+        .map(|(i, e)| Output { column: format!("probe_{i}"), expression: e.clone() })
+        .collect();
+    let values = base.values();
+    let theta: Vec<f64> = probe.parameters.iter().map(|p| values.parameters.get(&p.name).copied().unwrap_or(p.value)).collect();
+    let compiled = Compiled::new(&probe).ok()?;
+    let mut out = vec![Vec::new(); expressions.len()];
+    for s in 0..base.model.data().stretches.len() {
+        let start = base.model.start_of(s, &base.fit.theta);
+        let response = compiled.simulate(&base.model.run_of(s, &theta, &start));
+        for (series, o) in response.outputs.into_iter().zip(&mut out) {
+            o.push(series);
+        }
+    }
+    Some(out)
+}
+
+/// What is known of the signals at each slot.
+fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Option<Signals>> {
+    let data = base.model.data();
+    let simulation = base.model.simulation();
+    let values = base.values();
+    let constant = |e: &Expr| e.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some());
+    let mut expressions: Vec<Expr> = Vec::new();
+    let mut place = BTreeMap::new();
+    for slot in &structure.slots {
+        for (_, quantity) in slot.symbols() {
+            let text = quantity.expression.to_string();
+            place.entry(text).or_insert_with(|| {
+                expressions.push(quantity.expression.clone());
+                expressions.len() - 1
+            });
+        }
+    }
+    let Some(series) = along(base, &expressions) else {
+        return vec![None; structure.slots.len()];
+    };
+    let mut stretches = Vec::new();
+    let mut from = 0;
+    for s in &data.stretches {
+        stretches.push(from..from + s.len());
+        from += s.len();
+    }
+    let start_s = data.stretches.iter().max_by_key(|s| s.len()).map_or(0.0, |s| s.start_s);
+    let _ = &values;
+    structure
+        .slots
+        .iter()
+        .map(|slot| {
+            let mut moving = BTreeMap::new();
+            let mut constants = BTreeMap::new();
+            for (symbol, quantity) in slot.symbols() {
+                let all: Vec<f64> = series.get(*place.get(&quantity.expression.to_string())?)?.concat();
+                if constant(&quantity.expression) {
+                    constants.insert(symbol.to_owned(), *all.first()?);
+                } else {
+                    moving.insert(symbol.to_owned(), all);
+                }
+            }
+            let mut signals = Signals::new(data.period_s, start_s, moving);
+            signals.stretches.clone_from(&stretches);
+            signals.constants = constants;
+            signals.peaks_hz = peaks_hz.to_vec();
+            let output = slot.label.strip_prefix("output:").and_then(|c| simulation.outputs.iter().position(|o| o.column == c));
+            if let Some(o) = output {
+                signals.measured = Some(data.stretches.iter().flat_map(|s| s.outputs[o].iter().copied()).collect());
+            }
+            Some(signals)
+        })
+        .collect()
+}
+
+/// Everything in the catalogue that can be missing in this simulation, with its columns, best score first.
+///
+/// `original` is the user's simulation: slots are those of it, with what stands there now.
+pub fn screen(base: &Base<'_>, original: &Simulation, evidence: &(Projector, Vec<f64>), keep: &dyn Fn(&Mechanism, &Slot) -> bool) -> Vec<Candidate> {
+    let (own, r) = evidence;
+    let document = base.document();
+    let structure = Structure::within(&document, original);
+    let peaks = residual_peaks(base);
+    let at = signals(base, &structure, &peaks);
+    let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();
+    for mechanism in catalogue() {
+        for slot in mechanism.slots(&structure) {
+            let Some(place) = structure.slots.iter().position(|s| *s == slot) else { continue };
+            if !keep(mechanism, &structure.slots[place]) {
+                continue;
+            }
+            if let Some(signals) = &at[place] {
+                work.push((mechanism, &structure.slots[place], signals));
+            }
+        }
+    }
+    let values = base.values();
+    let total = norm2(r);
+    let mut found: Vec<Candidate> = work
+        .par_iter()
+        .filter_map(|(mechanism, slot, signals)| {
+            let screening = mechanism.rewrite(&document, slot, signals, Purpose::Screening).ok()?;
+            let refit = mechanism.rewrite(&document, slot, signals, Purpose::Refit).ok()?;
+            let mut points = features(base, &screening, slot, &values, own, r, total)?;
+            points.sort_by(|a, b| b.score.total_cmp(&a.score));
+            Some(Candidate { mechanism, slot: (*slot).clone(), refit, points, lacking: mechanism.lacking(signals) })
+        })
+        .collect();
+    found.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    found
+}
+
+/// The columns of every point of a screening form.
+fn features(
+    base: &Base<'_>,
+    screening: &Rewritten,
+    slot: &Slot,
+    values: &Values,
+    own: &Projector,
+    r: &[f64],
+    total: f64,
+) -> Option<Vec<Point>> {
+    let data = base.model.data();
+    let starts = screening.starts();
+    let mut points = Vec::new();
+    // Amplitudes at zero; the shapes are values, not unknowns.
+    let mut document = screening.simulation.clone();
+    for shape in &screening.shapes {
+        if let Some(p) = document.parameter_mut(&shape.name) {
+            p.fixed = true;
+        }
+    }
+    let own_states: Vec<String> = base.model.simulation().states.iter().map(|s| s.name.clone()).collect();
+    let model = Model::new(&document, data, &own_states, base.model.substeps()).ok()?;
+    let start = with_added_starts(values, screening, slot, data.stretches.len());
+    let mut theta = model.theta(&start);
+    let places: Vec<usize> = screening.amplitudes.iter().filter_map(|a| model.place_of(&a.name)).collect();
+    for &p in &places {
+        theta[p] = 0.0;
+    }
+    let every = starts.len().div_ceil(KEPT);
+    for (i, shapes) in starts.into_iter().enumerate() {
+        let Some((_, columns)) = model.tangents_with(&theta, &places, &shapes) else { continue };
+        let Some(group) = FeatureGroup::new(&columns, &data.layout, &base.whitener, own) else { continue };
+        let amplitudes = screening.amplitudes.iter().map(|a| a.name.clone()).zip(group.amplitudes(r, columns.len())).collect();
+        let score = score(total, group.explained(r), r.len(), group.columns.len());
+        let (concealment, norm) = (group.concealment, group.norm);
+        points.push(Point { shapes, group: (i % every == every / 2).then_some(group), concealment, norm, amplitudes, score });
+    }
+    (!points.is_empty()).then_some(points)
+}
+
+/// Frequencies of the largest peaks of the residual's spectrum, in hertz.
+fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
+    let data = base.model.data();
+    let Some(series) = data.layout.series.iter().max_by_key(|s| s.rows.len()) else { return Vec::new() };
+    let white = base.whitener.apply(&data.layout, &base.fit.residual);
+    let x = &white[series.rows.clone()];
+    let lines = hysid_signal::fourier(x);
+    let power: Vec<f64> = lines.iter().map(|(re, im)| re * re + im * im).collect();
+    let width = 1.0 / (data.period_s * x.len() as f64);
+    let mut peaks: Vec<usize> = (2..power.len().saturating_sub(1)).filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1]).collect();
+    peaks.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+    peaks.truncate(4);
+    let mut out = Vec::new();
+    for k in peaks {
+        // The line's true frequency by the parabola through the logarithms.
+        let (a, b, c) = (power[k - 1].max(1e-300).ln(), power[k].max(1e-300).ln(), power[k + 1].max(1e-300).ln());
+        let shift = if (a - 2.0 * b + c).abs() > 1e-12 { (0.5 * (a - c) / (a - 2.0 * b + c)).clamp(-0.5, 0.5) } else { 0.0 };
+        out.push((k as f64 + shift) * width);
+    }
+    out.sort_by(f64::total_cmp);
+    out
+}
+
+/// The values with a start for each state that an effect added: where the state of the slot that it goes with starts (`x_a` with `x`).
+pub fn with_added_starts(values: &Values, effect: &Rewritten, slot: &Slot, stretches: usize) -> Values {
+    let mut out = values.clone();
+    for name in &effect.states {
+        let symbol = name.split('_').next().unwrap_or(name);
+        let Some(Expr::Symbol(like)) = slot.quantity(symbol).map(|q| &q.expression) else { continue };
+        for s in 0..stretches {
+            if let Some(x) = values.initials.get(&(s, like.clone())) {
+                out.initials.insert((s, name.clone()), *x);
+            }
+        }
+    }
+    out
+}
+
+/// Whether least squares alone cannot move this shape: a time of change, a period, a knee that few samples reach.
+pub fn needs_profile(mechanism: &str, shape: &str) -> bool {
+    let shape = shape.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('_');
+    matches!(
+        (mechanism, shape),
+        ("abrupt_change", _) | ("cogging", "p_x") | ("periodic_disturbance", _) | ("gap_stop", _) | ("bilinear_stiffness", _) | ("overflow", _)
+    )
+}
+
+/// A mechanism written into a document at the slot of that label, scaled by the signals of a calibrated simulation.
+pub fn rewrite_at(
+    base: &Base<'_>,
+    document: &Simulation,
+    original: &Simulation,
+    mechanism: &'static Mechanism,
+    label: &str,
+) -> Option<(Rewritten, Slot)> {
+    let sizes = Structure::within(&base.document(), original);
+    let at = signals(base, &sizes, &residual_peaks(base));
+    let place = sizes.slots.iter().position(|s| s.label == label && mechanism.places.contains(&s.place))?;
+    let structure = Structure::within(document, original);
+    let slot = structure.slots.iter().find(|s| s.label == label && mechanism.places.contains(&s.place))?.clone();
+    let written = mechanism.rewrite(document, &slot, at[place].as_ref()?, Purpose::Refit).ok()?;
+    Some((written, slot))
+}
+
+impl Rewritten {
+    /// The names of its amplitudes and shapes, in the order of the law.
+    pub fn parameters_of(&self) -> Vec<String> {
+        self.amplitudes.iter().map(|a| a.name.clone()).chain(self.shapes.iter().map(|s| s.name.clone())).collect()
+    }
+}
