@@ -5,5 +5,6 @@ mod channel_facts;
 pub mod decimate;
 pub mod fit;
 pub mod generate;
+pub mod diagnose;
 pub mod inspect;
 pub mod predict;
