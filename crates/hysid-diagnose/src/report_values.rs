@@ -1,6 +1,6 @@
 //! What is reported of an effect: its numbers with intervals, evaluated from the fitted parameters.
 
-use hysid_plant::{ClockSource, Compiled, Drive, Expr, Output, Run, Simulation};
+use hysid_plant::{ClockSource, Compiled, Drive, Expr, Input, Output, Run, Simulation};
 
 use crate::base::Base;
 use crate::compose::Effect;
@@ -11,15 +11,17 @@ use crate::mechanism::Value;
 fn evaluate(document: &Simulation, expressions: &[Expr], theta: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let mut probe = document.clone();
     probe.states.clear();
-    probe.inputs.clear();
+    // An input that is zero throughout: a document refuses outputs that nothing moves.
+    let idle = probe.fresh_symbol("idle");
+    probe.inputs = vec![Input { symbol: idle.clone(), column: idle.clone() }];
     probe.time.clock = ClockSource::Period(1.0);
     probe.outputs = expressions
         .iter()
         .enumerate()
-        .map(|(i, e)| Output { column: format!("probe_{i}"), expression: e.clone() })
+        .map(|(i, e)| Output { column: format!("probe_{i}"), expression: e.clone() + Expr::Number(0.0) * Expr::symbol(&idle) })
         .collect();
     let compiled = Compiled::new(&probe).ok()?;
-    let drive = Drive::new(0.0, 1.0, 1, Vec::new()).ok()?;
+    let drive = Drive::new(0.0, 1.0, 1, vec![vec![0.0]]).ok()?;
     Some(
         theta
             .iter()

@@ -61,13 +61,21 @@ impl Candidate {
     }
 }
 
+/// The expression with nothing of an input added: a document refuses outputs that nothing moves.
+fn moving(e: &Expr, input: Option<&str>) -> Expr {
+    match input {
+        Some(u) => e.clone() + Expr::Number(0.0) * Expr::symbol(u),
+        None => e.clone(),
+    }
+}
+
 /// Values of expressions along a simulated trajectory: `[expression][stretch][sample]`.
 pub fn along(base: &Base<'_>, expressions: &[Expr]) -> Option<Vec<Vec<Vec<f64>>>> {
     let mut probe: Simulation = base.model.simulation().clone();
     probe.outputs = expressions
         .iter()
         .enumerate()
-        .map(|(i, e)| Output { column: format!("probe_{i}"), expression: e.clone() })
+        .map(|(i, e)| Output { column: format!("probe_{i}"), expression: moving(e, probe.inputs.first().map(|u| u.symbol.as_str())) })
         .collect();
     let values = base.values();
     let theta: Vec<f64> = probe.parameters.iter().map(|p| values.parameters.get(&p.name).copied().unwrap_or(p.value)).collect();
