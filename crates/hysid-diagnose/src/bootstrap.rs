@@ -40,7 +40,8 @@ pub fn ratio_of_rms(after: &[f64], before: &[f64], seed: u64) -> Ratio {
     let mut ratios: Vec<f64> = (0..400)
         .map(|i| {
             let mut rng = generator(seed, 0xB00u64 << 40 | i);
-            let (a, b) = (0..blocks).map(|_| sums[rng.random_range(0..blocks)]).fold((0.0, 0.0), |s, x| (s.0 + x.0, s.1 + x.1));
+            let (a, b) =
+                (0..blocks).map(|_| sums[rng.random_range(0..blocks)]).fold((0.0, 0.0), |s, x| (s.0 + x.0, s.1 + x.1));
             (a / b).sqrt()
         })
         .filter(|r| r.is_finite())

@@ -71,7 +71,14 @@ pub struct Setting<'d> {
 
 impl<'d> Setting<'d> {
     /// Fits a document from values; the noise model is that given, then its own.
-    pub fn fit(&self, document: &Simulation, start: &Values, noise: Option<&Whitener>, rounds: usize, iterations: usize) -> Option<Base<'d>> {
+    pub fn fit(
+        &self,
+        document: &Simulation,
+        start: &Values,
+        noise: Option<&Whitener>,
+        rounds: usize,
+        iterations: usize,
+    ) -> Option<Base<'d>> {
         let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
         fit_simulation(model, start, noise, rounds, LmOptions { iterations, ..LmOptions::default() })
     }
@@ -114,7 +121,8 @@ fn starts(candidate: &Candidate, most: usize) -> Vec<Vec<(String, f64)>> {
 /// Refits one candidate on top of a hypothesis' simulation.
 pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
     let document = &candidate.refit.simulation;
-    let values = with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
+    let values =
+        with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
     let mut best: Option<Base<'d>> = None;
     for start in starts(candidate, 3) {
         let mut from = values.clone();
@@ -123,7 +131,9 @@ pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Can
                 from.parameters.insert(name, x.clamp(p.lower(), p.upper()));
             }
         }
-        let Some(base) = setting.fit(document, &from, Some(&parent.base.whitener), 1, setting.iterations) else { continue };
+        let Some(base) = setting.fit(document, &from, Some(&parent.base.whitener), 1, setting.iterations) else {
+            continue;
+        };
         if best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood) {
             best = Some(base);
         }
@@ -236,7 +246,12 @@ pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Ca
 }
 
 /// The set without its `index`-th effect: the others are written anew in their order and fitted from where they were.
-pub fn without<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, set: &Hypothesis<'d>, index: usize) -> Option<Hypothesis<'d>> {
+pub fn without<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    set: &Hypothesis<'d>,
+    index: usize,
+) -> Option<Hypothesis<'d>> {
     let rest: Vec<&Effect> = set.effects.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, e)| e).collect();
     if rest.is_empty() {
         return None;
@@ -255,7 +270,12 @@ pub fn without<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, set: &Hypothesi
             }
         }
         document = written.0.simulation.clone();
-        effects.push(Effect { mechanism: e.mechanism, slot: written.1, written: written.0, concealment: e.concealment });
+        effects.push(Effect {
+            mechanism: e.mechanism,
+            slot: written.1,
+            written: written.0,
+            concealment: e.concealment,
+        });
     }
     let base = setting.fit(&document, &values, Some(&set.base.whitener), 2, setting.iterations)?;
     let log_evidence = setting.evidence(&base);
@@ -363,10 +383,14 @@ pub fn best_of(pool: &[Hypothesis<'_>]) -> Option<usize> {
     let most = pool.iter().map(|h| h.effects.len()).max()?;
     let mut standing: Option<usize> = None;
     for size in 0..=most {
-        let of_size = (0..pool.len()).filter(|&i| pool[i].effects.len() == size).max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence));
+        let of_size = (0..pool.len())
+            .filter(|&i| pool[i].effects.len() == size)
+            .max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence));
         let Some(i) = of_size else { continue };
         match standing {
-            Some(s) if pool[i].log_evidence < pool[s].log_evidence + LEAST_GAIN * (size - pool[s].effects.len()) as f64 => {}
+            Some(s)
+                if pool[i].log_evidence < pool[s].log_evidence + LEAST_GAIN * (size - pool[s].effects.len()) as f64 => {
+            }
             _ => standing = Some(i),
         }
     }

@@ -65,7 +65,11 @@ impl DataSet {
     ///
     /// # Errors
     /// No recording, a missing column, a constant output, unequal sampling periods, too few samples.
-    pub fn new(simulation: &Simulation, recordings: &[Recording], free_parameters: usize) -> Result<Self, DiagnoseError> {
+    pub fn new(
+        simulation: &Simulation,
+        recordings: &[Recording],
+        free_parameters: usize,
+    ) -> Result<Self, DiagnoseError> {
         let first = recordings.first().ok_or(DiagnoseError::NoRecording)?;
         let declared = match simulation.time.clock {
             ClockSource::Period(p) => Some(p),
@@ -113,7 +117,11 @@ impl DataSet {
                 if let Some(value) = values.next()
                     && values.all(|v| v == value)
                 {
-                    return Err(DiagnoseError::ConstantOutput { recording: r.name().to_owned(), column: (*name).to_owned(), value });
+                    return Err(DiagnoseError::ConstantOutput {
+                        recording: r.name().to_owned(),
+                        column: (*name).to_owned(),
+                        value,
+                    });
                 }
             }
             let before = stretches.len();
@@ -128,10 +136,8 @@ impl DataSet {
                 stretches.push(Stretch {
                     recording: index,
                     start_s,
-                    drive: Drive::new(start_s, period_s, range.len(), inputs).map_err(|e| DiagnoseError::Simulation {
-                        file: r.name().to_owned(),
-                        problem: e.to_string(),
-                    })?,
+                    drive: Drive::new(start_s, period_s, range.len(), inputs)
+                        .map_err(|e| DiagnoseError::Simulation { file: r.name().to_owned(), problem: e.to_string() })?,
                     outputs: y.iter().map(|c| c[range.clone()].to_vec()).collect(),
                     samples: range,
                 });
@@ -146,10 +152,22 @@ impl DataSet {
                 ));
             }
         }
-        Ok(Self::from_stretches(period_s, recordings.iter().map(|r| r.name().to_owned()).collect(), stretches, outputs.len(), notes))
+        Ok(Self::from_stretches(
+            period_s,
+            recordings.iter().map(|r| r.name().to_owned()).collect(),
+            stretches,
+            outputs.len(),
+            notes,
+        ))
     }
 
-    fn from_stretches(period_s: f64, recordings: Vec<String>, stretches: Vec<Stretch>, outputs: usize, notes: Vec<String>) -> Self {
+    fn from_stretches(
+        period_s: f64,
+        recordings: Vec<String>,
+        stretches: Vec<Stretch>,
+        outputs: usize,
+        notes: Vec<String>,
+    ) -> Self {
         let mut layout = Layout { series: Vec::new(), outputs };
         let mut y = Vec::new();
         for (stretch, s) in stretches.iter().enumerate() {
@@ -216,7 +234,9 @@ impl DataSet {
             };
             // One window in the middle moves to the loudest place, unless it would overlap the others.
             if share > 2 {
-                let loudest = (0..=(s.len() - length) / length.max(1)).map(|i| i * length).max_by(|a, b| power(*a).total_cmp(&power(*b)));
+                let loudest = (0..=(s.len() - length) / length.max(1))
+                    .map(|i| i * length)
+                    .max_by(|a, b| power(*a).total_cmp(&power(*b)));
                 if let Some(loudest) = loudest {
                     let middle = share / 2;
                     let clear = starts.iter().enumerate().all(|(i, &o)| i == middle || loudest.abs_diff(o) >= length);
@@ -264,7 +284,8 @@ impl DataSet {
     pub fn with_outputs(&self, y: Vec<f64>) -> Self {
         let mut out = self.clone();
         for s in &self.layout.series {
-            out.stretches[s.stretch].outputs[s.output][s.first..s.first + s.rows.len()].copy_from_slice(&y[s.rows.clone()]);
+            out.stretches[s.stretch].outputs[s.output][s.first..s.first + s.rows.len()]
+                .copy_from_slice(&y[s.rows.clone()]);
         }
         out.y = y;
         out
@@ -305,7 +326,10 @@ pub fn held_out_blocks(layout: &Layout, y: &[f64]) -> Vec<f64> {
         let edges: Vec<usize> = (0..=10).map(|i| i * n / 10).collect();
         let rows = &y[s.rows.clone()];
         let mean = rows.iter().sum::<f64>() / n as f64;
-        let power = |i: usize| rows[edges[i]..edges[i + 1]].iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (edges[i + 1] - edges[i]) as f64;
+        let power = |i: usize| {
+            rows[edges[i]..edges[i + 1]].iter().map(|v| (v - mean).powi(2)).sum::<f64>()
+                / (edges[i + 1] - edges[i]) as f64
+        };
         let mut out = vec![2, 5, 8];
         if let Some(loudest) = (0..10).max_by(|a, b| power(*a).total_cmp(&power(*b)))
             && !out.contains(&loudest)
@@ -363,7 +387,12 @@ mod tests {
         let e = |r: Recording| DataSet::new(&s, &[r], 1).unwrap_err().to_string();
         assert!(e(recording(ramp(100), vec![2.0; 100])).contains("constant"));
         assert!(e(recording(ramp(10), ramp(10))).contains("usable samples"));
-        let other = Recording::new("o.csv", Clock { start_s: 0.0, period_s: 0.1 }, vec![Channel { name: "u_N".into(), samples: ramp(50) }]).unwrap();
+        let other = Recording::new(
+            "o.csv",
+            Clock { start_s: 0.0, period_s: 0.1 },
+            vec![Channel { name: "u_N".into(), samples: ramp(50) }],
+        )
+        .unwrap();
         assert!(e(other).contains("no column `y_m`"));
         assert!(matches!(DataSet::new(&s, &[], 1), Err(DiagnoseError::NoRecording)));
     }
@@ -371,7 +400,8 @@ mod tests {
     #[test]
     fn a_long_recording_is_windowed_from_end_to_end() {
         let n = 10_000;
-        let d = DataSet::new(&simulation(), &[recording(ramp(n), (0..n).map(|i| (i as f64 * 0.1).sin()).collect())], 1).unwrap();
+        let d = DataSet::new(&simulation(), &[recording(ramp(n), (0..n).map(|i| (i as f64 * 0.1).sin()).collect())], 1)
+            .unwrap();
         let w = d.within(4000);
         assert!(w.samples() <= 4000 && w.samples() > 2500, "{}", w.samples());
         assert_eq!(w.stretches.first().unwrap().samples.start, 0);

@@ -18,7 +18,9 @@ pub enum DiagnoseError {
         available: String,
     },
     /// A recording with too few complete samples.
-    #[error("{recording}: {found} usable samples (rows with all inputs and an output); the simulation has {parameters} free parameters and initial states, and at least {needed} samples are needed")]
+    #[error(
+        "{recording}: {found} usable samples (rows with all inputs and an output); the simulation has {parameters} free parameters and initial states, and at least {needed} samples are needed"
+    )]
     TooFewSamples {
         /// The recording.
         recording: String,
@@ -40,7 +42,9 @@ pub enum DiagnoseError {
         value: f64,
     },
     /// Two recordings with different sampling periods.
-    #[error("{recording}: its sampling period is {found} s, that of {first} is {expected} s; one diagnosis needs one sampling period")]
+    #[error(
+        "{recording}: its sampling period is {found} s, that of {first} is {expected} s; one diagnosis needs one sampling period"
+    )]
     OtherPeriod {
         /// The recording.
         recording: String,
@@ -71,7 +75,9 @@ pub enum DiagnoseError {
         column: String,
     },
     /// The simulation diverges for every start that was tried.
-    #[error("{file}: the simulation diverges on {recording} (at {at_s} s with the values in the file) and no set of parameters within the bounds was found where it does not")]
+    #[error(
+        "{file}: the simulation diverges on {recording} (at {at_s} s with the values in the file) and no set of parameters within the bounds was found where it does not"
+    )]
     Explodes {
         /// The simulation file.
         file: String,

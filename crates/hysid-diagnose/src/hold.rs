@@ -40,7 +40,9 @@ pub fn free_run(document: &Simulation, data: &DataSet, own_states: &[String], su
     let (outputs, _) = full.simulate(&full.theta(&values));
     let prediction = data.stack(&outputs);
     let has_free = |stretch: usize| {
-        fixed.states.iter().any(|s| s.initial == Initial::Free || (data.stretches[stretch].samples.start > 0 && own_states.contains(&s.name)))
+        fixed.states.iter().any(|s| {
+            s.initial == Initial::Free || (data.stretches[stretch].samples.start > 0 && own_states.contains(&s.name))
+        })
     };
     let mut scored = vec![true; data.rows()];
     for s in &data.layout.series {

@@ -40,7 +40,9 @@ pub fn active_rows(series: &Series, r: &[f64], g: &[f64]) -> Vec<std::ops::Range
 /// The bands in which the residual before has more than twice the power of the residual after, widest power first, at most three.
 pub fn bands(before: &[f64], after: &[f64], period_s: f64) -> Vec<[f64; 2]> {
     let segment = (before.len() / 6).clamp(16, 2048).min(before.len());
-    let (Ok((f, b)), Ok((_, a))) = (power_spectrum(before, period_s, segment), power_spectrum(after, period_s, segment)) else {
+    let (Ok((f, b)), Ok((_, a))) =
+        (power_spectrum(before, period_s, segment), power_spectrum(after, period_s, segment))
+    else {
         return Vec::new();
     };
     let total: f64 = b.iter().zip(&a).map(|(b, a)| (b - a).max(0.0)).sum();
@@ -151,7 +153,12 @@ mod tests {
     fn a_region_is_told_in_the_coordinate_that_concentrates_the_weight() {
         let v: Vec<f64> = (0..1000).map(|i| (i as f64 * 0.37).sin()).collect();
         let x: Vec<f64> = (0..1000).map(|i| (i as f64 * 0.11).cos()).collect();
-        let c = |symbol: &str, values: &Vec<f64>, velocity| Coordinate { symbol: symbol.into(), unit: "m".into(), velocity, values: values.clone() };
+        let c = |symbol: &str, values: &Vec<f64>, velocity| Coordinate {
+            symbol: symbol.into(),
+            unit: "m".into(),
+            velocity,
+            values: values.clone(),
+        };
         let weight: Vec<f64> = x.iter().map(|x| if *x > 0.9 { 1.0 } else { 0.01 }).collect();
         let words = region(&[c("v", &v, true), c("x", &x, false)], &weight).unwrap();
         assert!(words.starts_with("x > "), "{words}");
@@ -164,7 +171,9 @@ mod tests {
     #[test]
     fn a_band_is_where_the_effect_took_power_away() {
         let n = 4000;
-        let before: Vec<f64> = (0..n).map(|i| (2.0 * std::f64::consts::PI * 5.0 * i as f64 * 0.01).sin() + 0.01 * ((i * 7919) % 101) as f64).collect();
+        let before: Vec<f64> = (0..n)
+            .map(|i| (2.0 * std::f64::consts::PI * 5.0 * i as f64 * 0.01).sin() + 0.01 * ((i * 7919) % 101) as f64)
+            .collect();
         let after: Vec<f64> = (0..n).map(|i| 0.01 * ((i * 7919) % 101) as f64).collect();
         let b = bands(&before, &after, 0.01);
         assert_eq!(b.len(), 1);

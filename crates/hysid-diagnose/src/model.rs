@@ -54,7 +54,12 @@ impl<'d> Model<'d> {
     ///
     /// # Errors
     /// What compiling finds.
-    pub fn new(simulation: &Simulation, data: &'d DataSet, own_states: &[String], substeps: usize) -> Result<Self, hysid_plant::Error> {
+    pub fn new(
+        simulation: &Simulation,
+        data: &'d DataSet,
+        own_states: &[String],
+        substeps: usize,
+    ) -> Result<Self, hysid_plant::Error> {
         let compiled = Compiled::new(simulation)?;
         let mut unknowns: Vec<Unknown> = compiled.estimated().into_iter().map(Unknown::Parameter).collect();
         let mut bounds: Vec<(f64, f64)> = unknowns
@@ -121,11 +126,20 @@ impl<'d> Model<'d> {
             .map(|(place, u)| match u {
                 Unknown::Parameter(i) => {
                     let p = &self.compiled.parameters()[*i];
-                    values.parameters.get(&p.name).copied().unwrap_or(p.value).clamp(self.bounds[place].0, self.bounds[place].1)
+                    values
+                        .parameters
+                        .get(&p.name)
+                        .copied()
+                        .unwrap_or(p.value)
+                        .clamp(self.bounds[place].0, self.bounds[place].1)
                 }
                 Unknown::Initial { stretch, state } => {
                     let name = &self.simulation().states[*state].name;
-                    values.initials.get(&(*stretch, name.clone())).copied().unwrap_or_else(|| self.measured_start(*stretch, name))
+                    values
+                        .initials
+                        .get(&(*stretch, name.clone()))
+                        .copied()
+                        .unwrap_or_else(|| self.measured_start(*stretch, name))
                 }
             })
             .collect()
@@ -178,20 +192,19 @@ impl<'d> Model<'d> {
     /// The start of a stretch: free values (in order of the free states) or all states.
     pub fn start_of(&self, stretch: usize, theta: &[f64]) -> Vec<f64> {
         let mine = |state: usize| {
-            self.unknowns
-                .iter()
-                .position(|u| *u == Unknown::Initial { stretch, state })
-                .map(|place| theta[place])
+            self.unknowns.iter().position(|u| *u == Unknown::Initial { stretch, state }).map(|place| theta[place])
         };
         let states = &self.simulation().states;
         if self.from_document[stretch] {
             (0..states.len()).filter_map(mine).collect()
         } else {
             (0..states.len())
-                .map(|s| mine(s).unwrap_or(match states[s].initial {
-                    Initial::Number(x) => x,
-                    _ => 0.0,
-                }))
+                .map(|s| {
+                    mine(s).unwrap_or(match states[s].initial {
+                        Initial::Number(x) => x,
+                        _ => 0.0,
+                    })
+                })
                 .collect()
         }
     }
@@ -237,7 +250,12 @@ impl<'d> Model<'d> {
     }
 
     /// As [`Model::tangents`], with some fixed parameters at other values.
-    pub fn tangents_with(&self, theta: &[f64], places: &[usize], set: &[(String, f64)]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    pub fn tangents_with(
+        &self,
+        theta: &[f64],
+        places: &[usize],
+        set: &[(String, f64)],
+    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let parameters = self.parameters(theta, set);
         let rows = self.data.rows();
         let mut prediction = vec![0.0; rows];
@@ -271,7 +289,8 @@ impl<'d> Model<'d> {
             }
             for series in self.data.layout.series.iter().filter(|x| x.stretch == s) {
                 let samples = series.first..series.first + series.rows.len();
-                prediction[series.rows.clone()].copy_from_slice(&sensitivity.response.outputs[series.output][samples.clone()]);
+                prediction[series.rows.clone()]
+                    .copy_from_slice(&sensitivity.response.outputs[series.output][samples.clone()]);
                 for (tangent, &c) in sensitivity.tangents.iter().zip(wanted) {
                     columns[c][series.rows.clone()].copy_from_slice(&tangent[series.output][samples.clone()]);
                 }

@@ -87,7 +87,11 @@ const PRICE_OF_AN_EFFECT: f64 = 4.0;
 pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, DiagnoseError> {
     let options = request.options;
     if !(options.alpha > 0.0 && options.alpha < 0.5) {
-        return Err(DiagnoseError::Option { option: "--alpha", given: options.alpha.to_string(), allowed: "above 0 and below 0.5" });
+        return Err(DiagnoseError::Option {
+            option: "--alpha",
+            given: options.alpha.to_string(),
+            allowed: "above 0 and below 0.5",
+        });
     }
     let simulation = request.simulation;
     dead_outputs(request)?;
@@ -97,7 +101,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let (full, held) = if request.holdout.is_empty() {
         split_blocks(&all)
     } else {
-        if let Some(same) = request.holdout.iter().find(|h| request.estimation.iter().any(|e| e.channels() == h.channels() && e.clock() == h.clock())) {
+        if let Some(same) = request
+            .holdout
+            .iter()
+            .find(|h| request.estimation.iter().any(|e| e.channels() == h.channels() && e.clock() == h.clock()))
+        {
             return Err(DiagnoseError::SameData(same.name().to_owned()));
         }
         (all, DataSet::new(simulation, request.holdout, 0)?)
@@ -111,7 +119,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("calibrating the simulation");
     let own_states: Vec<String> = simulation.states.iter().map(|s| s.name.clone()).collect();
-    let mut setting = Setting { data: &data, original: simulation.clone(), own_states, substeps: 2, own_unknowns: 0, iterations: 12 };
+    let mut setting =
+        Setting { data: &data, original: simulation.clone(), own_states, substeps: 2, own_unknowns: 0, iterations: 12 };
     let base = calibrate(&mut setting, request)?;
     setting.own_unknowns = base.model.unknowns().len();
     let log_evidence = setting.evidence(&base);
@@ -128,7 +137,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         schema: SCHEMA.into(),
         verdict: VerdictKind::NoSignificantMismatch,
         summary: String::new(),
-        mismatch: MismatchRecord { p_value: finite(test.p_value), residual_rms: residual_rms.clone(), noise_rms: residual_rms, detectable },
+        mismatch: MismatchRecord {
+            p_value: finite(test.p_value),
+            residual_rms: residual_rms.clone(),
+            noise_rms: residual_rms,
+            detectable,
+        },
         location: None,
         effects: Vec::new(),
         alternatives: Vec::new(),
@@ -191,9 +205,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         let rest = screen(&best.base, simulation, &after, &|_, _| true);
         let remaining = test_of(&rest, &best.base, &after, options);
         let noise = noise_floor(best);
-        let left = |e: &[f64]| data.layout.rms(e).iter().zip(&noise).map(|(r, n)| (r * r - n * n).max(0.0)).sum::<f64>();
-        let share = (left(&best.base.fit.residual) / left(&pool[0].base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
-        file.remaining = Some(RemainingRecord { p_value: remaining.p_value, share: if share.is_finite() { share } else { 0.0 } });
+        let left =
+            |e: &[f64]| data.layout.rms(e).iter().zip(&noise).map(|(r, n)| (r * r - n * n).max(0.0)).sum::<f64>();
+        let share =
+            (left(&best.base.fit.residual) / left(&pool[0].base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
+        file.remaining =
+            Some(RemainingRecord { p_value: remaining.p_value, share: if share.is_finite() { share } else { 0.0 } });
     }
 
     (hooks.progress)("scoring on the hold-out");
@@ -212,7 +229,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 fn dead_outputs(request: &Request<'_>) -> Result<(), DiagnoseError> {
     for o in &request.simulation.outputs {
         let symbols = o.expression.symbols();
-        let alive = symbols.iter().any(|s| request.simulation.state(s).is_some() || request.simulation.input(s).is_some() || s == "t" || request.simulation.parameter(s).is_some());
+        let alive = symbols.iter().any(|s| {
+            request.simulation.state(s).is_some()
+                || request.simulation.input(s).is_some()
+                || s == "t"
+                || request.simulation.parameter(s).is_some()
+        });
         if !alive {
             return Err(DiagnoseError::DeadOutput { file: request.file.to_owned(), column: o.column.clone() });
         }
@@ -237,7 +259,8 @@ fn split_blocks(all: &DataSet) -> (DataSet, DataSet) {
 /// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
 fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Base<'d>, DiagnoseError> {
     let simulation = request.simulation;
-    let bad = |e: hysid_plant::Error| DiagnoseError::Simulation { file: request.file.to_owned(), problem: e.to_string() };
+    let bad =
+        |e: hysid_plant::Error| DiagnoseError::Simulation { file: request.file.to_owned(), problem: e.to_string() };
     let model = Model::new(simulation, setting.data, &setting.own_states, setting.substeps).map_err(bad)?;
     let start = model.theta(&Values::default());
     let diverged = model.simulate(&start).1;
@@ -267,9 +290,21 @@ fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Bas
 }
 
 /// The mismatch test over all candidates' kept columns.
-fn test_of(candidates: &[Candidate], base: &Base<'_>, evidence: &(crate::evidence::Projector, Vec<f64>), options: Options) -> SurrogateTest {
-    let groups: Vec<&FeatureGroup> = candidates.iter().flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref())).collect();
-    surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, TestOptions { alpha: options.alpha, seed: options.seed })
+fn test_of(
+    candidates: &[Candidate],
+    base: &Base<'_>,
+    evidence: &(crate::evidence::Projector, Vec<f64>),
+    options: Options,
+) -> SurrogateTest {
+    let groups: Vec<&FeatureGroup> =
+        candidates.iter().flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref())).collect();
+    surrogate_test(
+        &groups,
+        &base.model.data().layout,
+        &evidence.0,
+        &evidence.1,
+        TestOptions { alpha: options.alpha, seed: options.seed },
+    )
 }
 
 fn by_column(simulation: &Simulation, values: &[f64]) -> BTreeMap<String, f64> {
@@ -285,9 +320,21 @@ fn detectability(candidates: &[Candidate]) -> Vec<DetectableRecord> {
             let amplitude = c.refit.amplitudes.first()?;
             let point = c.points.iter().filter(|p| p.norm > 0.0).max_by(|a, b| a.norm.total_cmp(&b.norm))?;
             let group = FeatureGroup::of_norm(point.norm);
-            let unit = c.refit.simulation.parameter(&amplitude.name)?.unit.as_ref().map(ToString::to_string).unwrap_or_default();
+            let unit = c
+                .refit
+                .simulation
+                .parameter(&amplitude.name)?
+                .unit
+                .as_ref()
+                .map(ToString::to_string)
+                .unwrap_or_default();
             let smallest = detectable_amplitude(&group, 1.0, count);
-            smallest.is_finite().then(|| DetectableRecord { mechanism: c.mechanism.id.into(), slot: c.slot.label.clone(), smallest, unit })
+            smallest.is_finite().then(|| DetectableRecord {
+                mechanism: c.mechanism.id.into(),
+                slot: c.slot.label.clone(),
+                smallest,
+                unit,
+            })
         })
         .collect();
     out.sort_by(|a, b| (&a.slot, &a.mechanism).cmp(&(&b.slot, &b.mechanism)));
@@ -307,13 +354,20 @@ fn weigh(h: &Hypothesis<'_>) -> Weighed {
 }
 
 /// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it.
-fn alternatives(pool: &[Hypothesis<'_>], weighed: &[Weighed], probability: &[f64], winner: usize, kind: VerdictKind) -> Vec<AlternativeRecord> {
+fn alternatives(
+    pool: &[Hypothesis<'_>],
+    weighed: &[Weighed],
+    probability: &[f64],
+    winner: usize,
+    kind: VerdictKind,
+) -> Vec<AlternativeRecord> {
     let mut out: Vec<AlternativeRecord> = Vec::new();
     let mut order: Vec<usize> = (0..pool.len()).collect();
     order.sort_by(|&a, &b| weighed[b].log_evidence.total_cmp(&weighed[a].log_evidence));
     for i in order {
         for e in &pool[i].effects {
-            let winning = pool[winner].effects.iter().any(|w| w.mechanism.id == e.mechanism.id && w.slot.label == e.slot.label);
+            let winning =
+                pool[winner].effects.iter().any(|w| w.mechanism.id == e.mechanism.id && w.slot.label == e.slot.label);
             let listed = out.iter().any(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
             if listed || (winning && kind != VerdictKind::Ambiguous) {
                 continue;
@@ -364,9 +418,19 @@ fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Candidat
         }
     }
     let longest = data.layout.series.iter().max_by_key(|s| s.rows.len())?;
-    let band_hz = locate::bands(&none.base.fit.residual[longest.rows.clone()], &best.base.fit.residual[longest.rows.clone()], data.period_s);
+    let band_hz = locate::bands(
+        &none.base.fit.residual[longest.rows.clone()],
+        &best.base.fit.residual[longest.rows.clone()],
+        data.period_s,
+    );
     let region = crate::region::words(none, best).unwrap_or_else(|| "everywhere on the trajectory".into());
-    Some(LocationRecord { slot: candidate.slot.label.clone(), block: candidate.mechanism.block_at(&candidate.slot).name().into(), time_s, band_hz, region })
+    Some(LocationRecord {
+        slot: candidate.slot.label.clone(),
+        block: candidate.mechanism.block_at(&candidate.slot).name().into(),
+        time_s,
+        band_hz,
+        region,
+    })
 }
 
 /// The noise that the best model leaves, by output.
@@ -374,7 +438,14 @@ fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {
     best.base.whitener.models.iter().map(|m| m.innovation().min(m.noise_rms())).collect()
 }
 
-fn fits(simulation: &Simulation, held: &DataSet, before: Option<&FreeRun>, after: Option<&FreeRun>, seed: u64, blocks: bool) -> Vec<FitRecord> {
+fn fits(
+    simulation: &Simulation,
+    held: &DataSet,
+    before: Option<&FreeRun>,
+    after: Option<&FreeRun>,
+    seed: u64,
+    blocks: bool,
+) -> Vec<FitRecord> {
     let mut out = Vec::new();
     for (r, name) in held.recordings.iter().enumerate() {
         for (o, output) in simulation.outputs.iter().enumerate() {
@@ -430,7 +501,10 @@ fn absorbing(base: &Base<'_>, simulation: &Simulation) -> Vec<String> {
         let unit = p.unit.as_ref();
         if at_bound {
             out.push(format!("parameter `{name}` of the recalibrated simulation stands at a bound ({}): it may be absorbing something", number_with_unit(value, unit)));
-        } else if p.value != 0.0 && (value / p.value > 2.0 || value / p.value < 0.5) && (p.value < low || p.value > high) {
+        } else if p.value != 0.0
+            && (value / p.value > 2.0 || value / p.value < 0.5)
+            && (p.value < low || p.value > high)
+        {
             out.push(format!(
                 "parameter `{name}` of the recalibrated simulation is {}, the file says {}",
                 number_with_unit(value, unit),
@@ -444,15 +518,28 @@ fn absorbing(base: &Base<'_>, simulation: &Simulation) -> Vec<String> {
 /// The verdict in a sentence or two.
 fn summary(file: &DiagnosisFile) -> String {
     let sentences = || file.effects.iter().map(|e| e.sentence.clone()).collect::<Vec<_>>().join(" ");
-    let rivals = || file.alternatives.iter().take(3).map(|a| format!("{} at {} ({:.0} %)", a.mechanism, a.slot, 100.0 * a.probability)).collect::<Vec<_>>().join(", ");
+    let rivals = || {
+        file.alternatives
+            .iter()
+            .take(3)
+            .map(|a| format!("{} at {} ({:.0} %)", a.mechanism, a.slot, 100.0 * a.probability))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     match file.verdict {
-        VerdictKind::NoSignificantMismatch => "The recalibrated simulation and the recording differ by no more than the noise.".into(),
+        VerdictKind::NoSignificantMismatch => {
+            "The recalibrated simulation and the recording differ by no more than the noise.".into()
+        }
         VerdictKind::Named => sentences(),
         VerdictKind::Family => {
             let families: Vec<&str> = file.effects.iter().map(|e| e.family.as_str()).collect();
             format!("The family is firm ({}), the member is not. The likeliest: {}", families.join(", "), sentences())
         }
-        VerdictKind::Ambiguous => format!("Several explanations remain: {}. The likeliest set: {}", rivals(), sentences()),
-        VerdictKind::NotInCatalogue => "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it.".into(),
+        VerdictKind::Ambiguous => {
+            format!("Several explanations remain: {}. The likeliest set: {}", rivals(), sentences())
+        }
+        VerdictKind::NotInCatalogue => {
+            "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it.".into()
+        }
     }
 }

@@ -60,7 +60,12 @@ pub fn words(none: &Hypothesis<'_>, best: &Hypothesis<'_>) -> Option<String> {
         .into_iter()
         .zip(&flat[1..])
         .enumerate()
-        .map(|(i, ((symbol, unit, _), values))| Coordinate { velocity: names.get(i) == Some(&"v") || symbol == "v", symbol, unit, values: values.clone() })
+        .map(|(i, ((symbol, unit, _), values))| Coordinate {
+            velocity: names.get(i) == Some(&"v") || symbol == "v",
+            symbol,
+            unit,
+            values: values.clone(),
+        })
         .collect();
     region(&coordinates, &weight)
 }

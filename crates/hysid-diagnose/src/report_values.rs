@@ -18,7 +18,10 @@ fn evaluate(document: &Simulation, expressions: &[Expr], theta: &[Vec<f64>]) -> 
     probe.outputs = expressions
         .iter()
         .enumerate()
-        .map(|(i, e)| Output { column: format!("probe_{i}"), expression: e.clone() + Expr::Number(0.0) * Expr::symbol(&idle) })
+        .map(|(i, e)| Output {
+            column: format!("probe_{i}"),
+            expression: e.clone() + Expr::Number(0.0) * Expr::symbol(&idle),
+        })
         .collect();
     let compiled = Compiled::new(&probe).ok()?;
     let drive = Drive::new(0.0, 1.0, 1, vec![vec![0.0]]).ok()?;
@@ -64,7 +67,8 @@ pub fn reported(base: &Base<'_>, effect: &Effect) -> Vec<ParameterRecord> {
         .enumerate()
         .map(|(e, r)| {
             let value = table[0][e];
-            let gradient: Vec<f64> = places.iter().enumerate().map(|(i, (_, step))| (table[i + 1][e] - value) / step).collect();
+            let gradient: Vec<f64> =
+                places.iter().enumerate().map(|(i, (_, step))| (table[i + 1][e] - value) / step).collect();
             let mut variance = 0.0;
             for (a, (pa, _)) in places.iter().enumerate() {
                 for (b, (pb, _)) in places.iter().enumerate() {

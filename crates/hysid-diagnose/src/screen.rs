@@ -75,10 +75,14 @@ pub fn along(base: &Base<'_>, expressions: &[Expr]) -> Option<Vec<Vec<Vec<f64>>>
     probe.outputs = expressions
         .iter()
         .enumerate()
-        .map(|(i, e)| Output { column: format!("probe_{i}"), expression: moving(e, probe.inputs.first().map(|u| u.symbol.as_str())) })
+        .map(|(i, e)| Output {
+            column: format!("probe_{i}"),
+            expression: moving(e, probe.inputs.first().map(|u| u.symbol.as_str())),
+        })
         .collect();
     let values = base.values();
-    let theta: Vec<f64> = probe.parameters.iter().map(|p| values.parameters.get(&p.name).copied().unwrap_or(p.value)).collect();
+    let theta: Vec<f64> =
+        probe.parameters.iter().map(|p| values.parameters.get(&p.name).copied().unwrap_or(p.value)).collect();
     let compiled = Compiled::new(&probe).ok()?;
     let mut out = vec![Vec::new(); expressions.len()];
     for s in 0..base.model.data().stretches.len() {
@@ -137,7 +141,8 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Opti
             signals.stretches.clone_from(&stretches);
             signals.constants = constants;
             signals.peaks_hz = peaks_hz.to_vec();
-            let output = slot.label.strip_prefix("output:").and_then(|c| simulation.outputs.iter().position(|o| o.column == c));
+            let output =
+                slot.label.strip_prefix("output:").and_then(|c| simulation.outputs.iter().position(|o| o.column == c));
             if let Some(o) = output {
                 signals.measured = Some(data.stretches.iter().flat_map(|s| s.outputs[o].iter().copied()).collect());
             }
@@ -149,7 +154,12 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Opti
 /// Everything in the catalogue that can be missing in this simulation, with its columns, best score first.
 ///
 /// `original` is the user's simulation: slots are those of it, with what stands there now.
-pub fn screen(base: &Base<'_>, original: &Simulation, evidence: &(Projector, Vec<f64>), keep: &dyn Fn(&Mechanism, &Slot) -> bool) -> Vec<Candidate> {
+pub fn screen(
+    base: &Base<'_>,
+    original: &Simulation,
+    evidence: &(Projector, Vec<f64>),
+    keep: &dyn Fn(&Mechanism, &Slot) -> bool,
+) -> Vec<Candidate> {
     let (own, r) = evidence;
     let document = base.document();
     let structure = Structure::within(&document, original);
@@ -215,10 +225,18 @@ fn features(
     for (i, shapes) in starts.into_iter().enumerate() {
         let Some((_, columns)) = model.tangents_with(&theta, &places, &shapes) else { continue };
         let Some(group) = FeatureGroup::new(&columns, &data.layout, &base.whitener, own) else { continue };
-        let amplitudes = screening.amplitudes.iter().map(|a| a.name.clone()).zip(group.amplitudes(r, columns.len())).collect();
+        let amplitudes =
+            screening.amplitudes.iter().map(|a| a.name.clone()).zip(group.amplitudes(r, columns.len())).collect();
         let score = score(total, group.explained(r), r.len(), group.columns.len());
         let (concealment, norm) = (group.concealment, group.norm);
-        points.push(Point { shapes, group: (i % every == every / 2).then_some(group), concealment, norm, amplitudes, score });
+        points.push(Point {
+            shapes,
+            group: (i % every == every / 2).then_some(group),
+            concealment,
+            norm,
+            amplitudes,
+            score,
+        });
     }
     (!points.is_empty()).then_some(points)
 }
@@ -232,14 +250,16 @@ fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
     let lines = hysid_signal::fourier(x);
     let power: Vec<f64> = lines.iter().map(|(re, im)| re * re + im * im).collect();
     let width = 1.0 / (data.period_s * x.len() as f64);
-    let mut peaks: Vec<usize> = (2..power.len().saturating_sub(1)).filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1]).collect();
+    let mut peaks: Vec<usize> =
+        (2..power.len().saturating_sub(1)).filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1]).collect();
     peaks.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
     peaks.truncate(4);
     let mut out = Vec::new();
     for k in peaks {
         // The line's true frequency by the parabola through the logarithms.
         let (a, b, c) = (power[k - 1].max(1e-300).ln(), power[k].max(1e-300).ln(), power[k + 1].max(1e-300).ln());
-        let shift = if (a - 2.0 * b + c).abs() > 1e-12 { (0.5 * (a - c) / (a - 2.0 * b + c)).clamp(-0.5, 0.5) } else { 0.0 };
+        let shift =
+            if (a - 2.0 * b + c).abs() > 1e-12 { (0.5 * (a - c) / (a - 2.0 * b + c)).clamp(-0.5, 0.5) } else { 0.0 };
         out.push((k as f64 + shift) * width);
     }
     out.sort_by(f64::total_cmp);
@@ -266,7 +286,12 @@ pub fn needs_profile(mechanism: &str, shape: &str) -> bool {
     let shape = shape.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('_');
     matches!(
         (mechanism, shape),
-        ("abrupt_change", _) | ("cogging", "p_x") | ("periodic_disturbance", _) | ("gap_stop", _) | ("bilinear_stiffness", _) | ("overflow", _)
+        ("abrupt_change", _)
+            | ("cogging", "p_x")
+            | ("periodic_disturbance", _)
+            | ("gap_stop", _)
+            | ("bilinear_stiffness", _)
+            | ("overflow", _)
     )
 }
 

@@ -35,7 +35,8 @@ pub fn probabilities(log_evidence: &[f64], weight: f64) -> Vec<f64> {
     if !top.is_finite() {
         return vec![0.0; log_evidence.len()];
     }
-    let raw: Vec<f64> = log_evidence.iter().map(|e| if e.is_finite() { (weight * (e - top)).exp() } else { 0.0 }).collect();
+    let raw: Vec<f64> =
+        log_evidence.iter().map(|e| if e.is_finite() { (weight * (e - top)).exp() } else { 0.0 }).collect();
     let sum: f64 = raw.iter().sum();
     raw.iter().map(|r| r / sum).collect()
 }
@@ -54,7 +55,8 @@ pub struct Support {
 /// The support that each claim of `best` finds among all hypotheses.
 pub fn supports(best: &[Claim], hypotheses: &[Hypothesis], probability: &[f64]) -> Vec<Support> {
     let total = |matches: &dyn Fn(&Claim) -> bool| -> f64 {
-        let sum: f64 = hypotheses.iter().zip(probability).filter(|(h, _)| h.claims.iter().any(matches)).map(|(_, p)| p).sum();
+        let sum: f64 =
+            hypotheses.iter().zip(probability).filter(|(h, _)| h.claims.iter().any(matches)).map(|(_, p)| p).sum();
         sum.min(1.0)
     };
     best.iter()
@@ -98,9 +100,18 @@ mod tests {
     #[test]
     fn the_deepest_firm_statement_is_made() {
         let table: [(&[(&str, &str, f64)], VerdictKind); 4] = [
-            (&[("coulomb_friction", "dry_friction", 0.0), ("cubic_stiffness", "hardening_stiffness", -20.0)], VerdictKind::Named),
-            (&[("coulomb_friction", "dry_friction", 0.0), ("stribeck_friction", "dry_friction", -1.0)], VerdictKind::Family),
-            (&[("coulomb_friction", "dry_friction", 0.0), ("quadratic_damping", "nonlinear_damping", -1.0)], VerdictKind::Ambiguous),
+            (
+                &[("coulomb_friction", "dry_friction", 0.0), ("cubic_stiffness", "hardening_stiffness", -20.0)],
+                VerdictKind::Named,
+            ),
+            (
+                &[("coulomb_friction", "dry_friction", 0.0), ("stribeck_friction", "dry_friction", -1.0)],
+                VerdictKind::Family,
+            ),
+            (
+                &[("coulomb_friction", "dry_friction", 0.0), ("quadratic_damping", "nonlinear_damping", -1.0)],
+                VerdictKind::Ambiguous,
+            ),
             (&[("cubic_stiffness", "hardening_stiffness", 0.0)], VerdictKind::Named),
         ];
         for (rivals, expected) in table {

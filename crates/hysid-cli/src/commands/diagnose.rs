@@ -76,12 +76,16 @@ fn work(args: &Args) -> Result<(), Failure> {
     let hooks = Hooks { progress: &progress, expired: &expired };
     let outcome = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
-            let text = std::fs::read_to_string(file).map_err(|e| Failure::BadInput(format!("{}: {e}", file.display())))?;
+            let text =
+                std::fs::read_to_string(file).map_err(|e| Failure::BadInput(format!("{}: {e}", file.display())))?;
             let name = file.display().to_string();
             let simulation = Simulation::parse(&text, &name).map_err(Failure::bad_input)?;
             let estimation = recordings(&args.recording, &simulation)?;
             let holdout = recordings(&args.holdout, &simulation)?;
-            diagnose(&Request { simulation: &simulation, file: &name, estimation: &estimation, holdout: &holdout, options }, &hooks)
+            diagnose(
+                &Request { simulation: &simulation, file: &name, estimation: &estimation, holdout: &holdout, options },
+                &hooks,
+            )
         }
         _ => return Err(Failure::BadInput("give a simulation file, or --simulated with --input and --output".into())),
     }
@@ -92,7 +96,8 @@ fn work(args: &Args) -> Result<(), Failure> {
     let page = hysid_report::diagnosis::page(&outcome.file, &outcome.picture, &provenance);
     hysid_io::write_text(&args.out.join("report.html"), &page).context("writing the report")?;
     if let Some(augmented) = &outcome.augmented {
-        hysid_io::write_text(&args.out.join("augmented.sim.toml"), &augmented.to_toml()).context("writing the augmented simulation")?;
+        hysid_io::write_text(&args.out.join("augmented.sim.toml"), &augmented.to_toml())
+            .context("writing the augmented simulation")?;
     }
     hysid_io::write_json(&args.out.join("diagnosis.json"), &outcome.file).context("writing the verdict")?;
     println!("{}: {}", outcome.file.verdict.word(), outcome.file.summary);
@@ -106,7 +111,11 @@ fn work(args: &Args) -> Result<(), Failure> {
 
 fn command_line() -> String {
     let quoted = |a: String| if a.contains(' ') { format!("'{a}'") } else { a };
-    std::env::args().enumerate().map(|(i, a)| if i == 0 { "hysid".to_owned() } else { quoted(a) }).collect::<Vec<_>>().join(" ")
+    std::env::args()
+        .enumerate()
+        .map(|(i, a)| if i == 0 { "hysid".to_owned() } else { quoted(a) })
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// The recordings with the columns that the simulation names.

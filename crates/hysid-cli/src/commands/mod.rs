@@ -3,8 +3,8 @@
 pub mod bench;
 mod channel_facts;
 pub mod decimate;
+pub mod diagnose;
 pub mod fit;
 pub mod generate;
-pub mod diagnose;
 pub mod inspect;
 pub mod predict;
