@@ -22,7 +22,19 @@ macro_rules! specimens {
         pub const SPECIMENS: &[(&str, &str)] = &[$(($name, include_str!(concat!("specimens/", $name, ".sim.toml")))),*];
     };
 }
-specimens!("oscillator", "servo", "two_masses", "tank", "thermal", "actuator", "damper", "pendulum", "wing", "motor",);
+specimens!(
+    "oscillator",
+    "servo",
+    "two_masses",
+    "tank",
+    "thermal",
+    "actuator",
+    "damper",
+    "pendulum",
+    "wing",
+    "motor",
+    "filter"
+);
 
 /// A breach of the suite's laws.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -183,6 +195,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.02, 1.0),
     (0.01, 12.0),
     (0.02, 6.0),
+    (1e-5, 0.5),
 ];
 
 /// A bench for each specimen.

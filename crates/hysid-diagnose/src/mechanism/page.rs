@@ -19,6 +19,7 @@ fn law_text(law: &Law) -> String {
 fn place_name(place: Place) -> &'static str {
     match place {
         Place::Input => "input",
+        Place::Between => "inside a cascade",
         Place::Force => "force on a moving part",
         Place::Connection => "force between two parts",
         Place::ForceLaw => "static force law",

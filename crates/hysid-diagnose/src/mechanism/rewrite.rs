@@ -162,6 +162,14 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             simulation.map_equations(|e| e.substitute(symbol, &by));
             Ok(())
         }
+        (Target::SymbolIn(symbol, states), Change::Replace(text)) => {
+            let by = writer.text(text)?;
+            for name in states {
+                let state = simulation.state_mut(name).ok_or("the state is gone")?;
+                state.derivative = state.derivative.substitute(symbol, &by);
+            }
+            Ok(())
+        }
         (Target::Output(column), Change::Replace(text)) => {
             let by = writer.text(text)?;
             let output = simulation.output_mut(column).ok_or("the output is gone")?;

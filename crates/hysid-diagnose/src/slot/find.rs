@@ -107,6 +107,7 @@ impl Structure {
         let finder = Finder { simulation, original, motions: motions(simulation, original) };
         let mut slots = Vec::new();
         slots.extend(finder.inputs());
+        slots.extend(finder.cascades());
         slots.extend(finder.forces());
         slots.extend(finder.connections());
         slots.extend(finder.force_laws());
@@ -226,6 +227,49 @@ impl Finder<'_> {
                 .outputs
                 .iter()
                 .any(|o| o.expression.uses(symbol) && has_free_constant(self.simulation, &o.expression));
+            slots.push(slot);
+        }
+        slots
+    }
+
+    /// Whether the state `one` has any influence on the state `other`.
+    fn reaches(&self, one: &str, other: &str) -> bool {
+        let mut reached = vec![one];
+        let mut next = 0;
+        while let Some(from) = reached.get(next).copied() {
+            for state in &self.simulation.states {
+                if state.derivative.uses(from) && !reached.contains(&state.name.as_str()) {
+                    reached.push(&state.name);
+                }
+            }
+            next += 1;
+        }
+        reached.iter().skip(1).any(|s| *s == other)
+    }
+
+    fn cascades(&self) -> Vec<Slot> {
+        let mut slots = Vec::new();
+        let known = |name: &str| self.original.state(name).is_some();
+        for source in self.simulation.states.iter().filter(|s| known(&s.name)) {
+            let integrates = |name: &str| self.motions.iter().any(|m| m.v == source.name && m.x == Some(name));
+            let driven: Vec<String> = self
+                .simulation
+                .states
+                .iter()
+                .filter(|s| known(&s.name) && s.name != source.name && s.derivative.uses(&source.name))
+                .filter(|s| !integrates(&s.name) && !self.reaches(&s.name, &source.name))
+                .map(|s| s.name.clone())
+                .collect();
+            let Some(first) = driven.first() else { continue };
+            let mut slot = Slot::new(
+                Place::Between,
+                format!("state:{first}"),
+                format!("where {} drives {first}", source.name),
+                Target::SymbolIn(source.name.clone(), driven.clone()),
+            );
+            slot.offer(self.simulation, "u", Expr::symbol(&source.name));
+            slot.context =
+                driven.iter().filter_map(|d| self.simulation.state(d)).map(|s| s.derivative.clone()).collect();
             slots.push(slot);
         }
         slots
@@ -457,6 +501,10 @@ impl Finder<'_> {
             let mut slot =
                 Slot::new(Place::Parameter, format!("parameter:{name}"), name.clone(), Target::Symbol(name.clone()));
             slot.offer(self.simulation, "p", Expr::symbol(name));
+            slot.mass = self.motions.iter().any(|m| match force_path(self.simulation, m.derivative) {
+                ForcePath::Quotient(_, mass) | ForcePath::Divided(mass) => mass.uses(name),
+                ForcePath::Bare => false,
+            });
             if let Some(output) = self.simulation.outputs.first() {
                 slot.offer(self.simulation, "y", output.expression.clone());
             }

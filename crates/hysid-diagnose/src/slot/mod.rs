@@ -6,6 +6,7 @@
 //! law can stand between them. A state without a partner whose unit is a speed is a velocity without its displacement; any
 //! other is a store. A simulation without states is a static relation: its force laws stand at the output, over the inputs
 //! that are a displacement or a velocity by their unit or name (where there is only a displacement, the velocity is `d(x)`).
+//! Where one part of a simulation drives another and nothing comes back, what it passes on is an input of the second.
 
 mod algebra;
 mod find;
@@ -25,6 +26,8 @@ pub(crate) use find::{ForcePath, force_path};
 pub enum Place {
     /// Before the plant: the input is replaced wherever it is used.
     Input,
+    /// Inside a cascade: what one part passes on to the next, without anything coming back.
+    Between,
     /// The force on a moving part, against the ground.
     Force,
     /// The force between two moving parts.
@@ -50,6 +53,8 @@ pub(crate) enum Target {
     Output(String),
     /// Replaces this symbol in every equation.
     Symbol(String),
+    /// Replaces this symbol in the derivatives of these states.
+    SymbolIn(String, Vec<String>),
 }
 
 /// A place of a simulation at which a mechanism can stand.
@@ -69,6 +74,7 @@ pub struct Slot {
     inputs: usize,
     constant: bool,
     loops: bool,
+    mass: bool,
 }
 
 /// What a symbol of a law stands for at a slot.
@@ -98,6 +104,7 @@ impl Slot {
             inputs: 0,
             constant: false,
             loops: false,
+            mass: false,
         }
     }
 
@@ -134,6 +141,11 @@ impl Slot {
     /// Whether a state of the simulation already has a loop in the velocity of this slot.
     pub(crate) fn loops(&self) -> bool {
         self.loops
+    }
+
+    /// Whether the slot is a parameter by which a force is divided: a mass.
+    pub(crate) fn is_mass(&self) -> bool {
+        self.mass
     }
 
     /// The measure of a mass here: `m` where there is one, else a pure number.

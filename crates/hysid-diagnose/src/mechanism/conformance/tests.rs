@@ -39,3 +39,29 @@ fn neutral_values_are_the_baseline_and_every_amplitude_moves_an_output() {
     }
     assert!(shown.is_empty(), "{} breaches:\n{}", shown.len(), shown.join("\n"));
 }
+
+#[test]
+fn the_form_holds_on_the_simulations_of_the_recordings() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/simulations");
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        assert!(std::env::var("HYSID_REQUIRE_RECORDINGS").as_deref() != Ok("1"), "{} is missing", folder.display());
+        println!("skipped: no recordings");
+        return;
+    };
+    let files = entries.filter_map(|e| e.ok().map(|e| e.path()));
+    let mut seen = 0;
+    for path in files.filter(|p| p.to_string_lossy().ends_with(".sim.toml")) {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let simulation = Simulation::parse(&text, &path.to_string_lossy()).unwrap();
+        let shown: Vec<String> =
+            check_simulation(&simulation).iter().map(|b| format!("{}: {}: {}", b.mechanism, b.at, b.what)).collect();
+        assert!(shown.is_empty(), "{} breaches:\n{}", shown.len(), shown.join("\n"));
+        let structure = Structure::of(&simulation);
+        for m in catalogue() {
+            let slots: Vec<String> = m.slots(&structure).iter().map(|s| format!("{s} ({})", s.whereabouts)).collect();
+            println!("{}: {}: {}", simulation.title, m.id, slots.join(", "));
+        }
+        seen += 1;
+    }
+    assert!(seen > 0);
+}

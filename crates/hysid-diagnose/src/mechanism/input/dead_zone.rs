@@ -8,7 +8,7 @@ pub static DEAD_ZONE: Mechanism = Mechanism {
     id: "dead_zone",
     family: Family::InputNonlinearity,
     block: Block::Input,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Between],
     applies: anywhere,
     already: &["max(min(u, P), Q)", "max(u - P, 0)"],
     law: |_, purpose| {

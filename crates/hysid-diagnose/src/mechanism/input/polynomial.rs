@@ -8,7 +8,7 @@ pub static INPUT_POLYNOMIAL: Mechanism = Mechanism {
     id: "input_polynomial",
     family: Family::InputNonlinearity,
     block: Block::Input,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Between],
     applies: anywhere,
     already: &["u^2", "u^3", "u*u", "u*abs(u)"],
     law: |_, _| {

@@ -8,7 +8,7 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     id: "input_saturation",
     family: Family::InputNonlinearity,
     block: Block::Input,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Between],
     applies: anywhere,
     already: &["max(min(u, P), Q)", "min(max(u, P), Q)"],
     law: |_, purpose| {

@@ -9,14 +9,10 @@ pub static SPRING_CLEARANCE: Mechanism = Mechanism {
     family: Family::Clearance,
     block: Block::Restoring,
     places: &[Place::Force, Place::ForceLaw],
-    applies: |slot| slot.has("x") && (slot.has("k") || slot.place == Place::ForceLaw),
+    applies: |slot| slot.has("x") && slot.has("k"),
     already: &["max(min(x, P), Q)", "min(max(x, P), Q)"],
-    law: |slot, purpose| {
+    law: |_, purpose| {
         let gap = Grid::Quantiles("x", vec![0.1, 0.2, 0.35, 0.5, 0.7]);
-        if !slot.has("k") {
-            // No linear spring to lose: the force that is missing inside the gap has its own stiffness.
-            return Law::force("-k_g*max(min(x, g), -g)").amplitude("k_g", "F/x", -2.0, 2.0).shape("g", "x", gap);
-        }
         match purpose {
             Purpose::Screening => Law::force("-w*k*max(min(x, g), -g)").weight().shape("g", "x", gap),
             Purpose::Refit => Law::force("-k*max(min(x, g), -g)").shape("g", "x", gap).within(0.0, 3.0).neutral(0.0),

@@ -10,13 +10,14 @@ pub static ABRUPT_CHANGE: Mechanism = Mechanism {
     block: Block::TimeVariation,
     places: &[Place::Parameter],
     applies: anywhere,
-    already: &["p*(1 + P*step(t - Q))"],
+    already: &["p*(1 + P*max(0, min(1, (t - Q)/R)))", "p*(1 + P*step(t - Q))"],
     law: |_, _| {
-        Law::replace("p*(1 + delta*step(t - t_0))").amplitude("delta", "1", -0.95, 3.0).shape(
-            "t_0",
-            "t",
-            Grid::Times(24),
-        )
+        // The jump takes two samples, so that the response moves smoothly with its moment and the moment can be fitted.
+        Law::replace("p*(1 + delta*max(0, min(1, (t - t_0)/h_0)))")
+            .amplitude("delta", "1", -0.95, 3.0)
+            .shape("t_0", "t", Grid::Times(24))
+            .constant("h_0", "h", Grid::Values(vec![2.0]))
+            .silent()
     },
     contains: &[],
     confusable: &["parameter_drift"],

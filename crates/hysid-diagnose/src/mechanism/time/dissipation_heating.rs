@@ -9,7 +9,7 @@ pub static DISSIPATION_HEATING: Mechanism = Mechanism {
     family: Family::TimeVariation,
     block: Block::TimeVariation,
     places: &[Place::Parameter],
-    applies: |slot| slot.has("v"),
+    applies: |slot| slot.has("v") && !slot.is_mass(),
     already: &["p*(1 + P*Z)"],
     law: |_, _| {
         Law::replace("p*(1 + beta*theta)")
