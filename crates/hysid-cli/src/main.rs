@@ -27,6 +27,7 @@ enum Command {
     Diagnose(commands::diagnose::Args),
     Inspect(commands::inspect::Args),
     Predict(commands::predict::Args),
+    Simulate(commands::simulate::Args),
     Generate(commands::generate::Args),
 }
 
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => commands::diagnose::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Predict(args) => commands::predict::run(&args),
+        Command::Simulate(args) => commands::simulate::run(&args),
         Command::Generate(args) => commands::generate::run(&args),
     };
     match outcome {

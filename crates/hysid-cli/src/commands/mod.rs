@@ -8,3 +8,4 @@ pub mod fit;
 pub mod generate;
 pub mod inspect;
 pub mod predict;
+pub mod simulate;

@@ -9,6 +9,7 @@
 
 mod data;
 mod frequency;
+mod initial;
 mod least_squares;
 mod noise;
 mod objective;
@@ -23,6 +24,7 @@ use objective::Objective;
 use observer::rms_about_mean;
 
 pub use data::Data;
+pub use initial::INITIAL_SHARE;
 pub use noise::NoiseModel;
 
 /// How far a calibration searches.
