@@ -79,7 +79,7 @@ const BASELINES: &[Baseline] = &[
         &["fsm_300mV_estimation_r0.csv", "fsm_100mV_estimation_r0.csv"],
         &["fsm_300mV_validation_r0.csv"],
         None,
-        0.6,
+        0.8,
     ),
 ];
 
