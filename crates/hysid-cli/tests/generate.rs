@@ -40,7 +40,7 @@ fn bad_options_end_with_status_2_and_say_what_is_allowed() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("x.csv");
     let out = out.to_str().unwrap();
-    let cases: [(&[&str], &str); 22] = [
+    let cases: [(&[&str], &str); 25] = [
         (&["--out", out], "name an operator; `hysid generate --list` shows them"),
         (&["bouc-wen"], "name the file to write by --out"),
         (&["boucwen", "--out", out], "there is no operator `boucwen`; there are baber-noori, bouc-wen"),
@@ -48,10 +48,13 @@ fn bad_options_end_with_status_2_and_say_what_is_allowed() {
         (&["bouc-wen", "--set", "beta", "--out", out], "write it as NAME=VALUE"),
         (&["bouc-wen", "--set", "beta=x", "--out", out], "beta must be a number"),
         (&["bouc-wen", "--set", "gamma=2", "--out", out], "gamma must be at most beta = 0.5 in size"),
-        (&["bouc-wen", "--set", "sub_steps=0", "--out", out], "sub_steps must be 1 or more"),
+        (&["bouc-wen", "--set", "sub_steps=0", "--out", out], "sub_steps must be 1 to 100000"),
         (&["preisach", "--set", "form=quick", "--out", out], "form must be one of staircase, grid, smooth"),
         (&["play", "--samples", "1", "--out", out], "--samples 1 is not allowed"),
         (&["play", "--samples", "999999999999", "--out", out], "it must be 2 to 100000000"),
+        (&["play", "--repeat", "999999999999", "--out", out], "--repeat must be at most"),
+        (&["prandtl-ishlinskii", "--set", "plays=999999999999", "--out", out], "plays must be 10000 or less"),
+        (&["maxwell-slip", "--set", "elements=0", "--out", out], "the number of elements must be 1 or more"),
         (&["play", "--period", "0", "--out", out], "period_s must be a finite number above 0"),
         (&["play", "--amplitude", "inf", "--out", out], "amplitude must be a finite number"),
         (&["play", "--excitation", "sine", "--frequency", "60", "--out", out], "the Nyquist frequency, 50 Hz"),

@@ -41,7 +41,7 @@ pub fn rk4<const N: usize>(x: &[f64; N], h: f64, f: impl Fn(f64, &[f64; N]) -> [
 }
 
 /// More sub-steps than this are never taken in one sampling period, however stiff the law.
-const MOST_SUB_STEPS: f64 = 100_000.0;
+const MOST_SUB_STEPS: u32 = 100_000;
 
 /// A differential law with a sampling period: an [`Operator`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,11 +64,11 @@ impl<const N: usize, L: Differential<N>> Sampled<L, N> {
     /// `law` sampled every `period_s` seconds, with at least `sub_steps` RK4 steps from each sample to the next.
     ///
     /// # Errors
-    /// The period is not a finite number above zero, or there is no sub-step.
+    /// The period is not a finite number above zero, or the sub-steps are not 1 to 100 000.
     pub fn new(law: L, period_s: f64, sub_steps: u32) -> Result<Self, ParameterError> {
         let check = Check("sampling");
         check.positive("period_s", period_s)?;
-        check.require("sub_steps", f64::from(sub_steps), sub_steps > 0, "1 or more")?;
+        check.require("sub_steps", f64::from(sub_steps), (1..=MOST_SUB_STEPS).contains(&sub_steps), "1 to 100000")?;
         Ok(Self { law, period_s, sub_steps })
     }
 
@@ -129,7 +129,11 @@ impl<const N: usize, L: Differential<N>> Sampled<L, N> {
     #[inline]
     fn sub_steps_needed(&self, x: &[f64; N], u: f64, u_dot: f64) -> u32 {
         let needed = self.law.fastest_rate(x, u, u_dot) * self.period_s;
-        if needed > f64::from(self.sub_steps) { needed.min(MOST_SUB_STEPS).ceil() as u32 } else { self.sub_steps }
+        if needed > f64::from(self.sub_steps) {
+            needed.min(f64::from(MOST_SUB_STEPS)).ceil() as u32
+        } else {
+            self.sub_steps
+        }
     }
 }
 
@@ -202,5 +206,6 @@ mod tests {
     fn a_bad_period_is_refused() {
         assert!(Sampled::new(Lag, 0.0, 1).is_err());
         assert!(Sampled::new(Lag, 1.0, 0).is_err());
+        assert!(Sampled::new(Lag, 1.0, u32::MAX).is_err());
     }
 }

@@ -72,7 +72,8 @@ mod tests {
     fn reversals_are_found_as_a_table_says() {
         use Turn::{Maximum, Minimum};
         let nan = f64::NAN;
-        let cases: [(&[f64], f64, &[(usize, Turn)]); 8] = [
+        type Case<'a> = (&'a [f64], f64, &'a [(usize, Turn)]);
+        let cases: [Case; 8] = [
             (&[0.0, 1.0, 0.0, 1.0], 0.0, &[(1, Maximum), (2, Minimum)]),
             (&[0.0, 1.0, 1.0, 0.0], 0.0, &[(1, Maximum)]),
             (&[0.0, 1.0, 2.0], 0.0, &[]),

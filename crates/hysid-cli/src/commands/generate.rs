@@ -135,6 +135,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let message = format!("generate: --samples {} is not allowed; it must be 2 to {MOST_SAMPLES}", args.samples);
         return Err(Failure::BadInput(message));
     }
+    if args.input.repeat.is_some_and(|repeat| repeat > MOST_SAMPLES) {
+        return Err(Failure::BadInput(format!("generate: --repeat must be at most {MOST_SAMPLES}")));
+    }
     let recording = record(args, entry)?;
     hysid_io::write_recording(out, &recording).map_err(Failure::bad_input)?;
     let range = |channel: &Channel| {

@@ -1,11 +1,10 @@
 //! The table of operators.
 
-use super::{Entry, Parameter, Values};
+use super::{Entry, Made, Parameter, Values};
 use crate::conformance::{Law, Laws};
+use crate::error::Check;
 use crate::preisach::{Density, Diagonal, Fields, Levels, PreisachPlane, Start};
 use crate::*;
-
-type Made = Result<Box<dyn DynOperator>, ParameterError>;
 
 /// Every operator, in alphabetical order.
 pub fn all() -> &'static [Entry] {
@@ -82,7 +81,15 @@ fn preisach(v: &Values) -> Made {
     })
 }
 
+/// More plays or springs than this are a mistyped number.
+const MOST_ELEMENTS: usize = 10_000;
+
+fn few_enough(operator: &'static str, name: &str, count: usize) -> Result<(), ParameterError> {
+    Check(operator).require(name, count as f64, count <= MOST_ELEMENTS, &format!("{MOST_ELEMENTS} or less"))
+}
+
 fn prandtl_ishlinskii(v: &Values) -> Made {
+    few_enough("prandtl-ishlinskii", "plays", v.count("plays"))?;
     let (count, widest, decay) = (v.count("plays"), v.number("widest"), v.number("decay"));
     let share = |i: usize| (-decay * i as f64 / count as f64).exp();
     let sum: f64 = (1..=count).map(share).sum();
@@ -93,6 +100,7 @@ fn prandtl_ishlinskii(v: &Values) -> Made {
 
 fn maxwell_slip(v: &Values) -> Made {
     let count = v.count("elements");
+    few_enough("maxwell-slip", "elements", count)?;
     let stiffness = v.number("stiffness") / count as f64;
     let elements: Vec<SlipElement> = (1..=count)
         .map(|i| SlipElement { stiffness, limit: stiffness * v.number("slip") * i as f64 / count as f64 })

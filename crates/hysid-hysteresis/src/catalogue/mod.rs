@@ -23,8 +23,11 @@ pub struct Entry {
     pub parameters: &'static [Parameter],
     /// What it obeys with the default parameters.
     pub laws: fn() -> Laws,
-    make: fn(&Values, f64) -> Result<Box<dyn DynOperator>, ParameterError>,
+    make: fn(&Values, f64) -> Made,
 }
+
+/// What a table entry makes of its parameters.
+type Made = Result<Box<dyn DynOperator>, ParameterError>;
 
 impl Entry {
     /// The operator with these parameters set (name and value as text) and the others at their defaults.
