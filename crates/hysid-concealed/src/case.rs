@@ -218,7 +218,8 @@ impl Case {
             None if random.chance(0.5) => Some(0.002 * speed),
             None => None,
         };
-        let simulation = simulation(&design, &declared, regularised, random);
+        let initial = if random.chance(0.3) { "\"free\"" } else { "0.0" };
+        let simulation = simulation(&design, &declared, regularised, initial);
         let names = kind.parameters();
         let label = Label {
             id: wanted.id.clone(),
@@ -389,8 +390,9 @@ fn concealed(design: &Design, e: &Effect) -> Concealed {
     }
 }
 
-/// The simulation file: what the user knows.
-fn simulation(design: &Design, declared: &[f64], regularised: Option<f64>, random: &mut Random) -> String {
+/// The simulation file: what the user knows. Parameters stand at `declared`, dry friction is `sign` or (with a speed) `tanh`, the initial
+/// state is known to be zero or `"free"`.
+pub fn simulation(design: &Design, declared: &[f64], regularised: Option<f64>, initial: &str) -> String {
     let kind = design.kind;
     let mut text = String::from("title = \"Simulation to be judged\"\n\n[time]\ncolumn = \"t_s\"\n");
     if design.hold == Hold::Zero && !kind.prescribed() {
@@ -418,10 +420,8 @@ fn simulation(design: &Design, declared: &[f64], regularised: Option<f64>, rando
     let friction = regularised.map_or_else(|| format!("sign({speed})"), |v| format!("tanh({speed}/{v:.6e})"));
     let states = kind.states(&friction);
     if !states.is_empty() {
-        let free = random.chance(0.3);
         text.push_str("\n[states]\n");
         for (symbol, derivative) in states {
-            let initial = if free { "\"free\"" } else { "0.0" };
             text.push_str(&format!("{symbol} = {{ derivative = \"{derivative}\", initial = {initial} }}\n"));
         }
     }

@@ -4,12 +4,16 @@
 //! else; the labels stay in this process until every case has been diagnosed. Reported figures come from the reporting
 //! stream of seeds, which shares no case with the development stream.
 
+#[cfg(test)]
+mod agreement;
+mod black;
 mod experiment;
 mod guard;
 mod linear;
 mod page;
 mod rivals;
 mod score;
+mod sindy;
 mod stats;
 mod trial;
 mod verdict;
@@ -116,7 +120,7 @@ fn trials(bench: &Bench, stream: Stream, seed: u64, range: std::ops::Range<usize
             .map(|i| {
                 let case = bank::case(stream, seed, i);
                 let trial = bench.run(&case)?;
-                let mut row = Row::new(&case, trial, rivals::rivals(&case));
+                let mut row = Row::new(&case, trial, rivals::rivals(bench, &case));
                 row.settled = bench.experiment(&case, &row)?;
                 let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                 if n.is_multiple_of(20) {

@@ -9,8 +9,10 @@ use hysid_concealed::machine::Machine;
 use hysid_concealed::refit::{Scope, Target, refit};
 use hysid_concealed::seed::{Random, Stream};
 
+use super::black::Errors;
 use super::linear;
-use super::trial::distance;
+use super::sindy;
+use super::trial::{Bench, distance};
 
 /// Errors of the competitors on one case.
 #[derive(Debug, Clone)]
@@ -23,15 +25,28 @@ pub struct Rivals {
     pub linear: f64,
     /// The same at 1.5 times the amplitude.
     pub linear_louder: Option<f64>,
+    /// Sparse regression of the missing force, for plants with one mass.
+    pub sindy: Option<f64>,
+    /// NARX by `hysid fit`, first output only: hold-out, and 1.5 times the amplitude.
+    pub narx: Errors,
+    /// NARX on what the recalibrated baseline leaves.
+    pub narx_on_residual: Errors,
     /// For a law outside the catalogue: squared distance in units of the noise to the best law inside, after its refit.
     pub separation: Option<f64>,
+}
+
+impl Rivals {
+    /// Smallest error of a black box at 1.5 times the amplitude.
+    pub fn best_black_box_louder(&self) -> Option<f64> {
+        [self.linear_louder, self.narx.1, self.narx_on_residual.1].into_iter().flatten().reduce(f64::min)
+    }
 }
 
 /// Samples that the search for the best rival law looks at.
 const LOOK: usize = 2000;
 
 /// Fits and runs the competitors.
-pub fn rivals(case: &Case) -> Rivals {
+pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
     let baseline = case.design.baseline(&case.machine.effects);
     let calibrated = fitted(case, &baseline, Scope::Plant);
     let truth = fitted(case, &case.machine, Scope::Effects);
@@ -44,6 +59,9 @@ pub fn rivals(case: &Case) -> Rivals {
         oracle: error(case, &truth, &case.val),
         linear: linear(&case.val),
         linear_louder: case.louder.as_ref().map(linear),
+        sindy: sindy::discrepancy(case, &calibrated).map(|m| error(case, &m, &case.val)),
+        narx: bench.narx(case),
+        narx_on_residual: bench.narx_on_residual(case, &calibrated),
         separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
     }
 }
