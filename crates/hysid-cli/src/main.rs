@@ -31,6 +31,16 @@ enum Command {
     Generate(commands::generate::Args),
 }
 
+/// How a page of this run can be made again.
+fn provenance() -> hysid_report::Provenance {
+    let quoted = |a: String| if a.contains(char::is_whitespace) { format!("\"{a}\"") } else { a };
+    let arguments: Vec<String> = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned())).collect();
+    hysid_report::Provenance {
+        command: format!("hysid {}", arguments.join(" ")),
+        version: env!("CARGO_PKG_VERSION").into(),
+    }
+}
+
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Bench(args) => commands::bench::run(&args),

@@ -6,8 +6,12 @@
 //!
 //! * [`figure`] draws lines, points, stems, bands and maps.
 //! * [`page`] puts sections, facts, tables and figures together.
-//! * [`diagnosis`] is the page of a diagnosis.
+//! * [`diagnosis`] is the page of a diagnosis, [`fit`] that of an identified model.
 
 pub mod diagnosis;
 pub mod figure;
+pub mod fit;
 pub mod page;
+mod words;
+
+pub use words::Provenance;

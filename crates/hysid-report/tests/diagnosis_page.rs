@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use hysid_diagnose::file::*;
 use hysid_diagnose::picture::{MapPicture, Picture, RecordPicture, Role};
-use hysid_report::diagnosis::{Provenance, page};
+use hysid_report::Provenance;
+use hysid_report::diagnosis::page;
 
 fn file(verdict: VerdictKind) -> DiagnosisFile {
     let named = verdict != VerdictKind::NoSignificantMismatch;

@@ -169,6 +169,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::BadInput(format!("{}: {e}", args.out.display())))?;
     found.model.save(&args.out.join("model.json")).map_err(Failure::bad_input)?;
     hysid_io::write_json(&args.out.join("fit.json"), &report.summary).map_err(Failure::bad_input)?;
+    let html = hysid_report::fit::page(&report, &crate::provenance());
+    write_text(&args.out.join("report.html"), &html).map_err(Failure::bad_input)?;
     if args.json {
         let text = serde_json::to_string_pretty(&report.summary).map_err(|e| Failure::Internal(e.into()))?;
         println!("{text}");

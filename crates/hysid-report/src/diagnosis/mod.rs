@@ -11,16 +11,7 @@ use hysid_diagnose::file::{DiagnosisFile, VerdictKind};
 use hysid_diagnose::picture::{ParameterPicture, Picture};
 
 use crate::page::{Align, Page, Table, Tenor};
-use words::{interval, number, percent, probability};
-
-/// How the page can be made again.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Provenance {
-    /// The command line as typed.
-    pub command: String,
-    /// The program's version.
-    pub version: String,
-}
+use crate::words::{Provenance, interval, number, p_value, percent, probability};
 
 /// How many of the smallest detectable effects are listed.
 const MOST_DETECTABLE: usize = 14;
@@ -54,7 +45,7 @@ pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) ->
 
 fn merit(page: &mut Page, file: &DiagnosisFile) {
     let mut facts = vec![(
-        file.mismatch.p_value.map_or_else(|| "not tested".into(), words::p_value),
+        file.mismatch.p_value.map_or_else(|| "not tested".into(), p_value),
         "p-value: the chance of a mismatch score this large with nothing missing".to_string(),
     )];
     if let Some(first) = file.effects.first() {
