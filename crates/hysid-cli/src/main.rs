@@ -6,9 +6,11 @@
 mod commands;
 mod failure;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use failure::Failure;
 
 #[derive(Debug, Parser)]
 #[command(name = "hysid", version, about = "Identify and diagnose systems with hysteresis", max_term_width = 100)]
@@ -23,6 +25,7 @@ enum Command {
     #[command(hide = true)]
     Bench(commands::bench::Args),
     Decimate(commands::decimate::Args),
+    Demo(commands::demo::Args),
     Fit(Box<commands::fit::Args>),
     Diagnose(commands::diagnose::Args),
     Inspect(commands::inspect::Args),
@@ -31,28 +34,34 @@ enum Command {
     Generate(commands::generate::Args),
 }
 
-/// How a page of this run can be made again.
+/// How a page of this run can be made again: the command line as the user typed it.
 fn provenance() -> hysid_report::Provenance {
     let quoted = |a: String| if a.contains(char::is_whitespace) { format!("\"{a}\"") } else { a };
-    let arguments: Vec<String> = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned())).collect();
+    let arguments: Vec<String> =
+        std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned())).collect();
     hysid_report::Provenance {
         command: format!("hysid {}", arguments.join(" ")),
         version: env!("CARGO_PKG_VERSION").into(),
     }
 }
 
-fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+/// Runs one command line, the program's name first.
+fn run(line: impl IntoIterator<Item = OsString>) -> Result<(), Failure> {
+    match Cli::parse_from(line).command {
         Command::Bench(args) => commands::bench::run(&args),
         Command::Decimate(args) => commands::decimate::run(&args),
+        Command::Demo(args) => commands::demo::run(&args),
         Command::Fit(args) => commands::fit::run(&args),
         Command::Diagnose(args) => commands::diagnose::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Predict(args) => commands::predict::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Generate(args) => commands::generate::run(&args),
-    };
-    match outcome {
+    }
+}
+
+fn main() -> ExitCode {
+    match run(std::env::args_os()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use hysid::identify::{Criterion, Decimate, Factors, FitReport, Options, Source, identify};
-use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require};
+use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require, write_text};
 use hysid_signal::Recording;
 use indicatif::{ProgressBar, ProgressStyle};
 

@@ -3,6 +3,7 @@
 pub mod bench;
 mod channel_facts;
 pub mod decimate;
+pub mod demo;
 pub mod diagnose;
 pub mod fit;
 pub mod generate;

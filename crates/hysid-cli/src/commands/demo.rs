@@ -1,0 +1,83 @@
+//! `hysid demo`: identifies a shipped recording with the very commands that a user types.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use hysid_io::write_text;
+
+use crate::failure::Failure;
+
+/// Identify a shipped recording; prints the commands that it runs and names the reports.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder for the recordings and the reports.
+    #[arg(long, value_name = "DIR", default_value = "hysid-demo")]
+    out: PathBuf,
+}
+
+/// A piezo actuator with hysteresis; `fixtures/README.md` has the command that made it.
+const PIEZO: &str = include_str!("../../../../fixtures/piezo_boucwen.csv");
+/// Rows that the model is made from; the rest is the hold-out.
+const ESTIMATION_ROWS: usize = 4000;
+
+/// Writes the shipped files, then runs `hysid` on them.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let out = &args.out;
+    if out.exists() && !out.is_dir() {
+        return Err(Failure::BadInput(format!("{}: it is there and is not a folder", out.display())));
+    }
+    std::fs::create_dir_all(out).map_err(|e| Failure::BadInput(format!("{}: {e}", out.display())))?;
+    let (est, val) = split(PIEZO, ESTIMATION_ROWS);
+    let file = |name: &str, text: &str| -> Result<PathBuf, Failure> {
+        let path = out.join(name);
+        write_text(&path, text).map_err(Failure::bad_input)?;
+        Ok(path)
+    };
+    let (est, val) = (file("piezo_est.csv", &est)?, file("piezo_val.csv", &val)?);
+    let fit = out.join("fit");
+    println!("1. A piezo actuator with hysteresis: a model from its recording.\n");
+    hysid(&[
+        "fit".as_ref(),
+        "--recording".as_ref(),
+        est.as_path(),
+        "--input".as_ref(),
+        "u_V".as_ref(),
+        "--output".as_ref(),
+        "y_um".as_ref(),
+        "--holdout".as_ref(),
+        val.as_path(),
+        "--out".as_ref(),
+        fit.as_path(),
+    ])?;
+    println!("\nOpen {} in a browser.", fit.join("report.html").display());
+    Ok(())
+}
+
+/// Prints and runs one command line.
+fn hysid(arguments: &[&Path]) -> Result<(), Failure> {
+    let shown: Vec<String> = arguments.iter().map(|a| a.display().to_string()).collect();
+    println!("$ hysid {}\n", shown.join(" "));
+    let line = std::iter::once(OsString::from("hysid")).chain(arguments.iter().map(|a| a.as_os_str().to_owned()));
+    crate::run(line)
+}
+
+/// The first `rows` rows of a recording and the rest, each under the header line.
+fn split(text: &str, rows: usize) -> (String, String) {
+    let (header, body) = text.split_once('\n').unwrap_or((text, ""));
+    let cut = body.match_indices('\n').nth(rows - 1).map_or(body.len(), |(i, _)| i + 1);
+    (format!("{header}\n{}", &body[..cut]), format!("{header}\n{}", &body[cut..]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_parts_have_the_header_and_no_row_is_lost() {
+        let (a, b) = split("t,y\n1,2\n3,4\n5,6\n", 2);
+        assert_eq!((a.as_str(), b.as_str()), ("t,y\n1,2\n3,4\n", "t,y\n5,6\n"));
+        let (a, b) = split(PIEZO, ESTIMATION_ROWS);
+        assert_eq!(a.lines().count(), ESTIMATION_ROWS + 1);
+        assert_eq!(a.lines().count() + b.lines().count(), PIEZO.lines().count() + 1);
+    }
+}
