@@ -176,7 +176,7 @@ h2 { font-size: 1.2rem; margin: 2.4rem 0 .4rem; border-top: 1px solid #dfe2e6; p
 figure { margin: 1rem 0; background: #fff; border: 1px solid #e3e6ea; border-radius: .6rem; padding: .6rem .6rem .4rem; }
 figure svg { display: block; width: 100%; height: auto; }
 figcaption { font-size: .88rem; color: #5c646e; padding: .2rem .4rem .3rem; }
-.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(22rem, 1fr)); gap: 1rem; align-items: start; }
+.pair { display: grid; grid-template-columns: repeat(auto-fill, minmax(22rem, 1fr)); gap: 1rem; align-items: start; }
 .pair figure { margin: 0; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; background: #fff; font-size: .93rem; margin: .6rem 0; }

@@ -8,7 +8,6 @@ use anyhow::Context;
 use hysid_diagnose::{Hooks, Options, Request, diagnose};
 use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_plant::{ClockSource, Simulation};
-use hysid_report::diagnosis::Provenance;
 use hysid_signal::Recording;
 
 use crate::failure::Failure;
@@ -92,8 +91,7 @@ fn work(args: &Args) -> Result<(), Failure> {
     .map_err(Failure::bad_input)?;
 
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::BadInput(format!("--out {}: {e}", args.out.display())))?;
-    let provenance = Provenance { command: command_line(), version: env!("CARGO_PKG_VERSION").to_owned() };
-    let page = hysid_report::diagnosis::page(&outcome.file, &outcome.picture, &provenance);
+    let page = hysid_report::diagnosis::page(&outcome.file, &outcome.picture, &crate::provenance());
     hysid_io::write_text(&args.out.join("report.html"), &page).context("writing the report")?;
     if let Some(augmented) = &outcome.augmented {
         hysid_io::write_text(&args.out.join("augmented.sim.toml"), &augmented.to_toml())
@@ -107,15 +105,6 @@ fn work(args: &Args) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-fn command_line() -> String {
-    let quoted = |a: String| if a.contains(' ') { format!("'{a}'") } else { a };
-    std::env::args()
-        .enumerate()
-        .map(|(i, a)| if i == 0 { "hysid".to_owned() } else { quoted(a) })
-        .collect::<Vec<_>>()
-        .join(" ")
 }
 
 /// The recordings with the columns that the simulation names.
