@@ -1,6 +1,7 @@
 //! Tasks of this repository; `cargo xtask --help` lists them.
 
 mod catalogue;
+mod ci;
 mod layers;
 mod prove;
 mod reproduce;
@@ -20,6 +21,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Task {
     Catalogue(catalogue::Args),
+    Ci(ci::Args),
     /// Check the house rules of `xtask/layers.toml`.
     Layers,
     Prove(prove::Args),
@@ -34,6 +36,7 @@ pub fn root() -> PathBuf {
 fn main() -> anyhow::Result<()> {
     match Cli::parse().task {
         Task::Catalogue(args) => catalogue::run(&args),
+        Task::Ci(args) => ci::run(&args),
         Task::Prove(args) => prove::run(&args),
         Task::Reproduce(args) => reproduce::run(&args),
         Task::Layers => {
