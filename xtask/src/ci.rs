@@ -26,7 +26,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         println!("== cargo xtask {name}");
         let began = Instant::now();
         let status = Command::new(&this).args(task).current_dir(crate::root()).status()?;
-        println!("== {name}: {} in {:.0} s\n", if status.success() { "passed" } else { "FAILED" }, began.elapsed().as_secs_f64());
+        println!(
+            "== {name}: {} in {:.0} s\n",
+            if status.success() { "passed" } else { "FAILED" },
+            began.elapsed().as_secs_f64()
+        );
         if !status.success() {
             failed.push(name);
         }
