@@ -106,6 +106,9 @@ fn criterion(text: &str) -> Result<Criterion, String> {
 /// The clock's column where the file has it; without one, samples are counted in seconds.
 const TIME: &str = "t_s";
 
+/// Samples without which no recording can teach even a linear model and hold some back to judge it.
+const FEWEST_SAMPLES: usize = 20;
+
 /// Reads the named columns of a recording.
 pub(crate) fn read(path: &Path, columns: &[&str]) -> Result<Recording, Failure> {
     let time = TimeSource::ColumnOrPeriod(TIME.into(), 1.0);
@@ -146,6 +149,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (estimation, holdout) = (read_all(&args.recordings)?, read_all(&args.holdouts)?);
     for recording in estimation.iter().chain(&holdout) {
         require::varying(recording, &args.output).map_err(Failure::bad_input)?;
+    }
+    for recording in &estimation {
+        require::samples(recording, &columns, FEWEST_SAMPLES).map_err(Failure::bad_input)?;
     }
     if args.out.exists() && !args.out.is_dir() {
         return Err(Failure::BadInput(format!("{}: it is there and is not a folder", args.out.display())));
