@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use hysid_linalg::Columns;
+use hysid_linalg::{Columns, Matrix, Start};
 
+use crate::kernel::Plan;
 use crate::record::{FIRST_SIGN, differences, next_sign};
 use crate::{Dictionary, DictionaryError, Factor, Quantity, Record, Signal, Term};
 
@@ -30,6 +31,7 @@ pub struct Design<'d> {
     stretches: Vec<Stretch>,
     rows: usize,
     records: usize,
+    plan: Plan,
 }
 
 impl<'d> Design<'d> {
@@ -71,7 +73,7 @@ impl<'d> Design<'d> {
         if rows == 0 {
             return Err(DictionaryError::TooShort { longest, lag: reach });
         }
-        Ok(Self { dictionary, channels, stretches, rows, records: records.len() })
+        Ok(Self { dictionary, channels, stretches, rows, records: records.len(), plan: Plan::new(dictionary.terms()) })
     }
 
     /// The dictionary.
@@ -115,7 +117,17 @@ impl<'d> Design<'d> {
         }
     }
 
-    fn fill_factor(&self, factor: Factor, rows: Range<usize>, out: &mut [f64], join: impl Fn(&mut f64, f64)) {
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    pub(crate) fn fill_factor(
+        &self,
+        factor: Factor,
+        rows: Range<usize>,
+        out: &mut [f64],
+        join: impl Fn(&mut f64, f64),
+    ) {
         let mut at = self.stretches.partition_point(|s| s.row + s.len <= rows.start);
         let mut done = rows.start;
         while done < rows.end && at < self.stretches.len() {
@@ -170,5 +182,14 @@ impl Columns for Design<'_> {
 
     fn fill(&self, j: usize, rows: Range<usize>, out: &mut [f64]) {
         self.fill_term(&self.dictionary.terms()[j], rows, out);
+    }
+
+    fn start(&self, y: &[f64]) -> Start {
+        self.fused_start(y)
+    }
+
+    fn gram_columns(&self, which: &[usize]) -> Matrix {
+        let (m, k) = (self.cols(), which.len());
+        Matrix::from_column_major(m, k, self.fused_gram_columns(which)).unwrap_or_else(|| Matrix::zeros(m, k))
     }
 }

@@ -37,6 +37,7 @@ mod collinear;
 mod design;
 mod dictionary;
 mod error;
+mod kernel;
 mod model;
 mod record;
 mod signals;

@@ -112,3 +112,62 @@ fn divergence_is_a_result() {
     assert!(run.y[5..].iter().all(|v| v.is_nan()));
     assert_eq!(run.y[4], 65536.0);
 }
+
+/// The design as a stored matrix, whose products are the plain ones.
+fn stored(design: &Design<'_>) -> hysid_linalg::Matrix {
+    let columns: Vec<Vec<f64>> = (0..design.cols())
+        .map(|j| {
+            let mut c = vec![0.0; design.rows()];
+            design.fill(j, 0..design.rows(), &mut c);
+            c
+        })
+        .collect();
+    hysid_linalg::Matrix::from_columns(&columns).unwrap()
+}
+
+fn close(name: &str, found: &[f64], expected: &[f64], scale: f64) -> Result<(), TestCaseError> {
+    for (j, (a, b)) in found.iter().zip(expected).enumerate() {
+        prop_assert!((a - b).abs() <= 1e-13 * scale, "{name}[{j}]: {a} {b}");
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+    #[test]
+    fn fused_products_equal_those_of_the_stored_matrix(
+        terms in terms(), n in 10usize..700, seed in 0u64..1000, which in prop::collection::vec(0usize..8, 1..12),
+    ) {
+        let mut state = seed;
+        let mut noise = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let mut series = || (0..n).map(|_| noise()).collect::<Vec<f64>>();
+        let (mut y, a, b) = (series(), series(), series());
+        y[n / 3] = f64::NAN;
+        let dictionary = Dictionary::from_terms(signals(), terms).unwrap();
+        let Ok(design) = Design::new(&dictionary, &[Record::new(&y, vec![&a, &b])]) else { return Ok(()) };
+        let (stored, target) = (stored(&design), design.target());
+        let (found, expected) = (design.start(&target), stored.start(&target));
+        close("norms", &found.norms, &expected.norms, n as f64)?;
+        close("cross", &found.cross, &expected.cross, n as f64)?;
+        close("target", &[found.target], &[expected.target], n as f64)?;
+        let which: Vec<usize> = which.into_iter().map(|j| j % design.cols()).collect();
+        close("gram", design.gram_columns(&which).as_slice(), stored.gram_columns(&which).as_slice(), n as f64)?;
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_not_a_bit() {
+    let wave = |p: f64| (0..30_000).map(|i| (i as f64 * p).sin()).collect::<Vec<f64>>();
+    let (u, y) = (wave(0.37), wave(0.11));
+    let dictionary = hysid_dictionary::Spec::narx(Signals::siso(), 4, 0..=4, 3).build().unwrap();
+    let design = Design::new(&dictionary, &[Record::siso(&u, &y)]).unwrap();
+    let target = design.target();
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| (design.start(&target), design.gram_columns(&[0, 5, 77])))
+    };
+    assert_eq!(on(1), on(3));
+}

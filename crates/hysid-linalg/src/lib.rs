@@ -5,6 +5,7 @@
 //! Householder QR with equilibrated columns. No type of a linear-algebra crate appears in a signature.
 
 mod columns;
+pub mod lanes;
 mod lstsq;
 mod matrix;
 mod tall;
