@@ -1,11 +1,12 @@
 //! All inner products of the dictionary with a few weights in one pass over the samples, columns made on the fly.
 //!
-//! The terms form a tree: a term is its prefix (all factors but the last) times its last factor. A prefix is multiplied out once a
-//! tile, and every term below it costs one multiply-add a sample and weight; memory traffic is that of the
-//! signals. This is the (degree 2) x (lag) form of the cubic dictionary, for any set of terms.
+//! A term is a head (all factors but the last two) times a tail (its last one or two factors). The distinct tails are multiplied
+//! out once a tile; a head is multiplied into each weight once; then every term costs one multiply-add for each weight
+//! and sample, as a matrix product of weighted heads with tails. Memory traffic is that of the signals. Heads whose tails end
+//! alike (all of a full polynomial dictionary) are taken together, so that the product has enough rows even for one weight.
 
 use hysid_linalg::Columns;
-use hysid_linalg::lanes::{LANE, Lane, Machine, Step, multiply, pack, total};
+use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, multiply, pack, total};
 use rayon::prelude::*;
 
 use crate::{Design, Factor, Term};
@@ -14,6 +15,8 @@ use crate::{Design, Factor, Term};
 const TILE: usize = 256;
 /// Lanes in a tile.
 const T: usize = TILE / LANE;
+/// Rows that the matrix product is given at least, where there are so many.
+const GROUP: usize = 8;
 /// Shortest block of samples that a thread is given.
 const SHORTEST_BLOCK: usize = 8 * TILE;
 /// Blocks that long data are cut into, whatever the number of threads.
@@ -21,16 +24,14 @@ const BLOCKS: usize = 16;
 /// Work (in multiply-adds) below which threads cost more than they bring.
 const SERIAL_BELOW: usize = 3_000_000;
 
-/// A prefix and the terms below it.
+/// A head and the terms that it makes.
 #[derive(Debug, Clone)]
 struct Node {
-    /// The variable that makes this prefix of its parent's; `None` at the root.
-    variable: Option<usize>,
-    /// Number of factors.
-    depth: usize,
-    /// First lane in the tile of each last factor.
-    factors: Vec<u32>,
-    /// The terms, as places in `order`, begin here.
+    /// The variables whose product it is.
+    head: Vec<usize>,
+    /// First lane in the tile of each tail.
+    tails: Vec<u32>,
+    /// The first of its terms, as a place in `order`; one place for each tail.
     first: usize,
 }
 
@@ -39,12 +40,13 @@ struct Node {
 pub(crate) struct Plan {
     /// The distinct factors.
     pub variables: Vec<Factor>,
+    /// The tails of two factors, as pairs of variables; in the tile they follow the variables.
+    pairs: Vec<(usize, usize)>,
     nodes: Vec<Node>,
     /// The dictionary's column of each place.
     order: Vec<usize>,
     /// The column of the constant.
     constant: Option<usize>,
-    depth: usize,
 }
 
 impl Plan {
@@ -54,73 +56,106 @@ impl Plan {
         variables.dedup();
         let place = |f: &Factor| variables.binary_search(f).unwrap_or(0);
         let constant = terms.iter().position(|t| t.degree() == 0);
-        // Sorted by factors, a prefix stands before everything below it.
-        let mut sorted: Vec<(Vec<usize>, usize)> = terms
+        // (head, tail, column), in order of head and tail.
+        let mut split: Vec<(Vec<usize>, Vec<usize>, usize)> = terms
             .iter()
             .enumerate()
             .filter(|(_, t)| t.degree() > 0)
-            .map(|(j, t)| (t.factors().iter().map(place).collect(), j))
+            .map(|(j, t)| {
+                let mut head: Vec<usize> = t.factors().iter().map(place).collect();
+                let tail = head.split_off(head.len().saturating_sub(2));
+                (head, tail, j)
+            })
             .collect();
-        let prefix = |f: &[usize]| f[..f.len() - 1].to_vec();
-        sorted.sort_by(|a, b| (prefix(&a.0), &a.0).cmp(&(prefix(&b.0), &b.0)));
+        split.sort();
+        let mut pairs: Vec<(usize, usize)> =
+            split.iter().filter_map(|(_, tail, _)| (tail.len() == 2).then(|| (tail[0], tail[1]))).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let lane = |tail: &[usize]| match *tail {
+            [a, b] => (variables.len() + pairs.binary_search(&(a, b)).unwrap_or(0)) * T,
+            _ => tail[0] * T,
+        };
         let mut nodes: Vec<Node> = Vec::new();
-        let mut path: Vec<usize> = Vec::new();
-        let mut order = Vec::with_capacity(sorted.len());
-        for (factors, column) in &sorted {
-            let wanted = prefix(factors);
-            if nodes.is_empty() || path != wanted {
-                // Prefixes that are no node yet (their own terms were ruled out) become nodes without terms.
-                let shared = path.iter().zip(&wanted).take_while(|(a, b)| a == b).count();
-                if nodes.is_empty() && !wanted.is_empty() {
-                    nodes.push(Node { variable: None, depth: 0, factors: Vec::new(), first: 0 });
-                }
-                for depth in shared..wanted.len() {
-                    let variable = Some(wanted[depth]);
-                    nodes.push(Node { variable, depth: depth + 1, factors: Vec::new(), first: order.len() });
-                }
-                if wanted.is_empty() {
-                    nodes.push(Node { variable: None, depth: 0, factors: Vec::new(), first: 0 });
-                }
-                path = wanted;
+        let mut order = Vec::with_capacity(split.len());
+        for (head, tail, column) in &split {
+            if nodes.last().is_none_or(|n| n.head != *head) {
+                nodes.push(Node { head: head.clone(), tails: Vec::new(), first: order.len() });
             }
-            if let (Some(node), Some(&last)) = (nodes.last_mut(), factors.last()) {
-                node.factors.push((last * T) as u32);
+            if let Some(node) = nodes.last_mut() {
+                node.tails.push(lane(tail) as u32);
             }
             order.push(*column);
         }
-        let depth = nodes.iter().map(|n| n.depth).max().unwrap_or(0);
-        Self { variables, nodes, order, constant, depth }
+        Self { variables, pairs, nodes, order, constant }
     }
 
-    /// Adds the products of all terms with `k` weights over one tile to `sums`.
-    ///
-    /// `tile` holds the variables one after the other. `sums` has k lanes for each place.
-    fn accumulate(&self, work: &mut Work, tile: &[Lane], k: usize, machine: Machine) {
-        for node in &self.nodes {
-            if let (Some(v), true) = (node.variable, node.depth > 1) {
-                let (head, tail) = work.products.split_at_mut((node.depth - 1) * T);
-                multiply(&head[(node.depth - 2) * T..], &tile[v * T..(v + 1) * T], &mut tail[..T], machine);
-            } else if let Some(v) = node.variable {
-                work.products[..T].copy_from_slice(&tile[v * T..(v + 1) * T]);
+    /// Fills in the tails of two factors.
+    fn multiply_pairs(&self, tile: &mut [Lane], machine: Machine) {
+        let (single, double) = tile.split_at_mut(self.variables.len() * T);
+        for (&(a, b), out) in self.pairs.iter().zip(double.chunks_exact_mut(T)) {
+            multiply(&single[a * T..(a + 1) * T], &single[b * T..(b + 1) * T], out, machine);
+        }
+    }
+
+    /// Adds the products of all terms with `k` weights over one tile to `work.sums`.
+    fn accumulate(&self, work: &mut Work, k: usize, machine: Machine) {
+        let together = (GROUP / k).max(1);
+        let places = self.order.len();
+        let Work { tile, weights, heads, sums, rows, .. } = work;
+        for group in self.nodes.chunks(together) {
+            for (g, node) in group.iter().enumerate() {
+                for c in 0..k {
+                    let to = &mut heads[(g * k + c) * T..(g * k + c + 1) * T];
+                    let weight = &weights[c * T..(c + 1) * T];
+                    match node.head[..] {
+                        [] => to.copy_from_slice(weight),
+                        [v, ..] => multiply(weight, &tile[v * T..(v + 1) * T], to, machine),
+                    }
+                    for &v in node.head.iter().skip(1) {
+                        multiply_into(to, &tile[v * T..(v + 1) * T]);
+                    }
+                }
             }
-            if node.factors.is_empty() {
-                continue;
+            // The tails that all heads of the group end with; what comes before is each head's own.
+            let first = &group[0];
+            let common = (0..first.tails.len())
+                .find(|&n| group.iter().all(|node| node.tails.ends_with(&first.tails[n..])))
+                .map_or(0, |n| first.tails.len() - n);
+            for (g, node) in group.iter().enumerate() {
+                let own = node.tails.len() - common;
+                rows.clear();
+                rows.extend((0..k).map(|c| Row { from: (g * k + c) * T, to: c * places + node.first }));
+                Step { t: T, rows, left: heads, columns: &node.tails[..own], right: tile, out: sums }.run(machine);
             }
-            let prefix = node.depth.checked_sub(1).map(|d| &work.products[d * T..(d + 1) * T]);
-            let (weights, factors) = (&work.weights[..], &node.factors[..]);
-            let out = &mut work.sums[node.first * k..(node.first + factors.len()) * k];
-            Step { t: T, k, prefix, weights, tile, factors, scratch: &mut work.scratch, out }.run(machine);
+            rows.clear();
+            for (g, node) in group.iter().enumerate() {
+                let to = node.first + node.tails.len() - common;
+                rows.extend((0..k).map(|c| Row { from: (g * k + c) * T, to: c * places + to }));
+            }
+            let columns = &first.tails[first.tails.len() - common..];
+            Step { t: T, rows, left: heads, columns, right: tile, out: sums }.run(machine);
+        }
+    }
+}
+
+fn multiply_into(to: &mut [Lane], by: &[Lane]) {
+    for (a, b) in to.iter_mut().zip(by) {
+        for e in 0..LANE {
+            a.0[e] *= b.0[e];
         }
     }
 }
 
 /// The buffers of one block of samples.
 struct Work {
+    /// The variables and the tails of two factors.
     tile: Vec<Lane>,
-    products: Vec<Lane>,
     weights: Vec<Lane>,
-    scratch: Vec<Lane>,
+    heads: Vec<Lane>,
+    /// `sums[c * places + place]`.
     sums: Vec<Lane>,
+    rows: Vec<Row>,
     plain: Vec<f64>,
 }
 
@@ -128,11 +163,11 @@ impl Work {
     fn new(plan: &Plan, k: usize) -> Self {
         let lanes = |n: usize| vec![Lane::default(); n];
         Self {
-            tile: lanes(plan.variables.len() * T),
-            products: lanes(plan.depth.max(1) * T),
+            tile: lanes((plan.variables.len() + plan.pairs.len()) * T),
             weights: lanes(k * T),
-            scratch: lanes(k * T),
+            heads: lanes(k * (GROUP / k).max(1) * T),
             sums: lanes(plan.order.len() * k),
+            rows: Vec::new(),
             plain: vec![0.0; TILE],
         }
     }
@@ -151,11 +186,12 @@ impl Design<'_> {
         }
     }
 
-    fn pack_tile(&self, work: &mut Work, at: usize, len: usize) {
+    fn pack_tile(&self, work: &mut Work, at: usize, len: usize, machine: Machine) {
         for (v, &f) in self.plan().variables.iter().enumerate() {
             self.fill_factor(f, at..at + len, &mut work.plain[..len], |o, x| *o = x);
             pack(&work.plain[..len], &mut work.tile[v * T..(v + 1) * T]);
         }
+        self.plan().multiply_pairs(&mut work.tile, machine);
     }
 
     /// Norms of all columns and their products with `y`.
@@ -174,16 +210,12 @@ impl Design<'_> {
                 let w = &y[at..at + len];
                 target += hysid_linalg::dot(w, w);
                 sum += w.iter().sum::<f64>();
-                self.pack_tile(&mut work, at, len);
+                self.pack_tile(&mut work, at, len, machine);
                 pack(w, &mut work.weights);
-                let tile = std::mem::take(&mut work.tile);
-                plan.accumulate(&mut work, &tile, 1, machine);
-                multiply(&tile, &tile, &mut squares.tile, machine);
+                plan.accumulate(&mut work, 1, machine);
+                multiply(&work.tile, &work.tile, &mut squares.tile, machine);
                 squares.weights.fill(Lane([1.0; LANE]));
-                work.tile = tile;
-                let tile = std::mem::take(&mut squares.tile);
-                plan.accumulate(&mut squares, &tile, 1, machine);
-                squares.tile = tile;
+                plan.accumulate(&mut squares, 1, machine);
                 at += len;
             }
             let mut out = vec![0.0; 2 * m + 1];
@@ -203,6 +235,8 @@ impl Design<'_> {
 
     /// The columns `which` of the Gram matrix.
     pub(crate) fn fused_gram_columns(&self, which: &[usize]) -> Vec<f64> {
+        let began = std::time::Instant::now();
+        let _g = which.len();
         let (plan, m, k) = (self.plan(), self.cols(), which.len());
         let machine = Machine::detect();
         let partials = self.over_blocks(m * k * self.rows(), |range| {
@@ -211,21 +245,19 @@ impl Design<'_> {
             let mut at = range.start;
             while at < range.end {
                 let len = TILE.min(range.end - at);
-                self.pack_tile(&mut work, at, len);
+                self.pack_tile(&mut work, at, len, machine);
                 for (c, &j) in which.iter().enumerate() {
                     self.fill(j, at..at + len, &mut work.plain[..len]);
                     constant[c] += work.plain[..len].iter().sum::<f64>();
                     pack(&work.plain[..len], &mut work.weights[c * T..(c + 1) * T]);
                 }
-                let tile = std::mem::take(&mut work.tile);
-                plan.accumulate(&mut work, &tile, k, machine);
-                work.tile = tile;
+                plan.accumulate(&mut work, k, machine);
                 at += len;
             }
             let mut out = vec![0.0; m * k];
             for (place, &j) in plan.order.iter().enumerate() {
                 for c in 0..k {
-                    out[c * m + j] = total(&work.sums[place * k + c]);
+                    out[c * m + j] = total(&work.sums[c * plan.order.len() + place]);
                 }
             }
             if let Some(j) = plan.constant {
@@ -235,6 +267,7 @@ impl Design<'_> {
             }
             out
         });
+        eprintln!("pass k={_g} {:.4}", began.elapsed().as_secs_f64());
         add_up(partials)
     }
 }

@@ -1,7 +1,6 @@
-//! The kernel of a selection: sums over samples of products of a prefix, several weights and several last factors.
+//! The kernel of a selection: inner products of rows with columns over one tile of samples.
 //!
-//! For one tile of samples, out\[l, c\] += sum over t of p\[t\] w_c\[t\] x_l\[t\]: the prefix is multiplied into the weights once, the
-//! rest is one fused multiply-add for each weight, factor and sample, in register blocks. Sums are kept as eight
+//! out\[row + l\] += sum over t of a_row\[t\] x_l\[t\], in register blocks of rows and columns. Sums are kept as eight
 //! interleaved partial sums, added up by [`total`] at the end.
 //!
 //! The same source is compiled for AVX-512, for AVX2 with FMA and for the baseline, and chosen at run time. Results differ
@@ -67,26 +66,27 @@ impl Machine {
     }
 }
 
-/// One step of the kernel over a tile of `t` lanes.
-///
-/// `prefix` (t lanes) is the product that all these terms share, `None` for 1; `weights` holds `k` weights of t lanes one after
-/// the other; `factors[i]` is the range of lanes in `tile` where the i-th last factor lies; `scratch` has room for
-/// k * t lanes; `out[i * k + c]` receives factor i with weight c.
+/// A row of the left factor: where its samples and its sums lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row {
+    /// Its first lane in `left`.
+    pub from: usize,
+    /// The lane of `out` that receives its product with the first column; the next columns follow.
+    pub to: usize,
+}
+
+/// Inner products over a tile of `t` lanes: `out[row.to + l]` grows by row times column l.
 pub struct Step<'a> {
     /// Lanes in a tile.
     pub t: usize,
-    /// Number of weights.
-    pub k: usize,
-    /// The shared product; `None` is 1.
-    pub prefix: Option<&'a [Lane]>,
-    /// The weights, one after the other.
-    pub weights: &'a [Lane],
-    /// Where the last factors lie.
-    pub tile: &'a [Lane],
-    /// First lane in `tile` of each last factor.
-    pub factors: &'a [u32],
-    /// Room for the weighted prefix.
-    pub scratch: &'a mut [Lane],
+    /// The rows.
+    pub rows: &'a [Row],
+    /// The samples of the rows.
+    pub left: &'a [Lane],
+    /// First lane in `right` of each column.
+    pub columns: &'a [u32],
+    /// The samples of the columns.
+    pub right: &'a [Lane],
     /// Partial sums.
     pub out: &'a mut [Lane],
 }
@@ -146,8 +146,8 @@ fn multiply_wide(a: &[Lane], b: &[Lane], out: &mut [Lane]) {
 trait Form {
     /// A lane in registers.
     type V: Copy;
-    /// Last factors in a register block of four weights, and in one of fewer.
-    const BLOCK: (usize, usize);
+    /// Columns in a register block of eight, four, two rows, and of one; zero rules a number of rows out.
+    const BLOCK: [usize; 4];
     unsafe fn load(from: &Lane) -> Self::V;
     unsafe fn store(v: Self::V, to: &mut Lane);
     unsafe fn mul(a: Self::V, b: Self::V) -> Self::V;
@@ -160,7 +160,7 @@ struct Plain;
 
 impl Form for Plain {
     type V = Lane;
-    const BLOCK: (usize, usize) = (1, 2);
+    const BLOCK: [usize; 4] = [0, 1, 2, 2];
     #[inline(always)]
     unsafe fn load(from: &Lane) -> Lane {
         *from
@@ -195,7 +195,7 @@ mod x86 {
 
     impl Form for Wide {
         type V = __m512d;
-        const BLOCK: (usize, usize) = (6, 8);
+        const BLOCK: [usize; 4] = [3, 6, 8, 8];
         #[inline(always)]
         unsafe fn load(from: &Lane) -> __m512d {
             // SAFETY: a lane is 64 bytes, aligned to 64.
@@ -224,7 +224,7 @@ mod x86 {
 
     impl Form for Fused {
         type V = (__m256d, __m256d);
-        const BLOCK: (usize, usize) = (1, 2);
+        const BLOCK: [usize; 4] = [0, 1, 2, 4];
         #[inline(always)]
         unsafe fn load(from: &Lane) -> Self::V {
             let p = from.0.as_ptr();
@@ -268,89 +268,77 @@ unsafe fn multiply_in<F: Form>(a: &[Lane], b: &[Lane], out: &mut [Lane]) {
 /// As for [`Form`].
 #[inline(always)]
 unsafe fn step<F: Form>(step: Step<'_>) {
-    let Step { t, k, prefix, weights, tile, factors, scratch, out } = step;
-    let weighted: &[Lane] = match prefix {
-        None => &weights[..k * t],
-        Some(p) => {
-            for (s, w) in scratch[..k * t].chunks_exact_mut(t).zip(weights.chunks_exact(t)) {
-                unsafe { multiply_in::<F>(&p[..t], w, s) };
-            }
-            &scratch[..k * t]
-        }
-    };
-    let n = factors.len();
-    let mut c = 0;
-    while c < k {
-        let wide = if k - c >= 4 {
-            4
-        } else if k - c >= 2 {
-            2
-        } else {
-            1
+    let Step { t, rows, left, columns, right, out } = step;
+    let mut rest = rows;
+    while !rest.is_empty() {
+        let (high, most) = match rest.len() {
+            8.. if F::BLOCK[0] > 0 => (8, F::BLOCK[0]),
+            4.. => (4, F::BLOCK[1]),
+            2.. => (2, F::BLOCK[2]),
+            _ => (1, F::BLOCK[3]),
         };
-        let most = if wide == 4 { F::BLOCK.0 } else { F::BLOCK.1 };
         let mut at = 0;
-        while at < n {
-            let (f, o) = (&factors[at..], &mut out[at * k..]);
-            let w = &weighted[c * t..];
-            let left = (n - at).min(most);
+        while at < columns.len() {
+            let c = &columns[at..];
+            // Four columns in blocks of at most three are two and two.
+            let wide = if most == 3 && c.len() == 4 { 2 } else { most.min(c.len()) };
             // SAFETY: the caller's.
             at += unsafe {
-                match (wide, left) {
-                    (4, 6..) => block::<F, 4, 6>(t, k, c, w, tile, f, o),
-                    (4, 4..) => block::<F, 4, 4>(t, k, c, w, tile, f, o),
-                    (4, 2..) => block::<F, 4, 2>(t, k, c, w, tile, f, o),
-                    (4, _) => block::<F, 4, 1>(t, k, c, w, tile, f, o),
-                    (2, 8..) => block::<F, 2, 8>(t, k, c, w, tile, f, o),
-                    (2, 4..) => block::<F, 2, 4>(t, k, c, w, tile, f, o),
-                    (2, 2..) => block::<F, 2, 2>(t, k, c, w, tile, f, o),
-                    (2, _) => block::<F, 2, 1>(t, k, c, w, tile, f, o),
-                    (_, 8..) => block::<F, 1, 8>(t, k, c, w, tile, f, o),
-                    (_, 4..) => block::<F, 1, 4>(t, k, c, w, tile, f, o),
-                    (_, 2..) => block::<F, 1, 2>(t, k, c, w, tile, f, o),
-                    (_, _) => block::<F, 1, 1>(t, k, c, w, tile, f, o),
+                match (high, wide) {
+                    (8, 3..) => block::<F, 8, 3>(t, rest, at, left, c, right, out),
+                    (8, 2) => block::<F, 8, 2>(t, rest, at, left, c, right, out),
+                    (8, _) => block::<F, 8, 1>(t, rest, at, left, c, right, out),
+                    (4, 6..) => block::<F, 4, 6>(t, rest, at, left, c, right, out),
+                    (4, 3..) => block::<F, 4, 3>(t, rest, at, left, c, right, out),
+                    (4, 2) => block::<F, 4, 2>(t, rest, at, left, c, right, out),
+                    (4, _) => block::<F, 4, 1>(t, rest, at, left, c, right, out),
+                    (2, 8..) => block::<F, 2, 8>(t, rest, at, left, c, right, out),
+                    (2, 4..) => block::<F, 2, 4>(t, rest, at, left, c, right, out),
+                    (2, 2..) => block::<F, 2, 2>(t, rest, at, left, c, right, out),
+                    (2, _) => block::<F, 2, 1>(t, rest, at, left, c, right, out),
+                    (_, 8..) => block::<F, 1, 8>(t, rest, at, left, c, right, out),
+                    (_, 4..) => block::<F, 1, 4>(t, rest, at, left, c, right, out),
+                    (_, 2..) => block::<F, 1, 2>(t, rest, at, left, c, right, out),
+                    (_, _) => block::<F, 1, 1>(t, rest, at, left, c, right, out),
                 }
             };
         }
-        c += wide;
+        rest = &rest[high..];
     }
 }
 
-/// One register block: `K` weights from the first lanes of `weighted` on, `L` factors; returns `L`.
+/// One register block: the first `K` rows and the first `L` of `columns`, which are columns `at..` of the step; returns `L`.
 ///
 /// # Safety
 /// As for [`Form`].
 #[inline(always)]
 unsafe fn block<F: Form, const K: usize, const L: usize>(
     t: usize,
-    k: usize,
-    c: usize,
-    weighted: &[Lane],
-    tile: &[Lane],
-    factors: &[u32],
+    rows: &[Row],
+    at: usize,
+    left: &[Lane],
+    columns: &[u32],
+    right: &[Lane],
     out: &mut [Lane],
 ) -> usize {
-    let w: [&[Lane]; K] = std::array::from_fn(|i| &weighted[i * t..(i + 1) * t]);
-    let x: [&[Lane]; L] = std::array::from_fn(|l| {
-        let from = factors[l] as usize;
-        &tile[from..from + t]
-    });
+    let a: [&[Lane]; K] = std::array::from_fn(|i| &left[rows[i].from..rows[i].from + t]);
+    let x: [&[Lane]; L] = std::array::from_fn(|l| &right[columns[l] as usize..columns[l] as usize + t]);
     // SAFETY: the caller's; all slices have t lanes.
     unsafe {
         let zero = F::load(&Lane([0.0; LANE]));
         let mut sums = [[zero; L]; K];
         for s in 0..t {
-            let a: [F::V; K] = std::array::from_fn(|i| F::load(w[i].get_unchecked(s)));
-            for l in 0..L {
-                let b = F::load(x[l].get_unchecked(s));
-                for i in 0..K {
-                    sums[i][l] = F::mul_add(a[i], b, sums[i][l]);
+            let b: [F::V; L] = std::array::from_fn(|l| F::load(x[l].get_unchecked(s)));
+            for i in 0..K {
+                let w = F::load(a[i].get_unchecked(s));
+                for l in 0..L {
+                    sums[i][l] = F::mul_add(w, b[l], sums[i][l]);
                 }
             }
         }
-        for l in 0..L {
-            for i in 0..K {
-                let o = &mut out[l * k + c + i];
+        for i in 0..K {
+            for l in 0..L {
+                let o = &mut out[rows[i].to + at + l];
                 F::store(F::add(F::load(o), sums[i][l]), o);
             }
         }
@@ -370,7 +358,6 @@ mod tests {
             (0..n).map(|i| Lane(std::array::from_fn(|e| value(from + i * LANE + e)))).collect()
         };
         let tile = lanes(20 * t, 17);
-        let p = lanes(t, 900);
         let mut machines = vec![Machine::Plain];
         if Machine::detect() != Machine::Plain {
             machines.push(Machine::Fused);
@@ -378,26 +365,19 @@ mod tests {
         if Machine::detect() == Machine::Wide {
             machines.push(Machine::Wide);
         }
-        for (k, n) in [(1, 1), (1, 19), (2, 7), (3, 13), (4, 6), (7, 20), (8, 17), (5, 3)] {
-            let weights = lanes(k * t, 5000);
-            let factors: Vec<u32> = (0..n).map(|i| (i * t) as u32).collect();
+        for (k, n) in [(1, 1), (1, 19), (2, 7), (3, 13), (4, 6), (7, 20), (8, 17), (15, 3), (9, 4), (12, 5)] {
+            let left = lanes(k * t, 5000);
+            let columns: Vec<u32> = (0..n).map(|i| (i * t) as u32).collect();
+            let rows: Vec<Row> = (0..k).map(|i| Row { from: i * t, to: i * n }).collect();
             for &machine in &machines {
-                for prefix in [None, Some(&p[..])] {
-                    let mut out = vec![Lane::default(); n * k];
-                    let mut scratch = vec![Lane::default(); k * t];
-                    let (weights, tile, factors) = (&weights[..], &tile[..], &factors[..]);
-                    Step { t, k, prefix, weights, tile, factors, scratch: &mut scratch, out: &mut out }.run(machine);
-                    for l in 0..n {
-                        for c in 0..k {
-                            let expected: f64 = (0..t * LANE)
-                                .map(|s| {
-                                    let at = |lanes: &[Lane], from: usize| lanes[from + s / LANE].0[s % LANE];
-                                    prefix.map_or(1.0, |p| at(p, 0)) * at(weights, c * t) * at(tile, l * t)
-                                })
-                                .sum();
-                            let found = total(&out[l * k + c]);
-                            assert!((found - expected).abs() < 1e-12, "{machine:?} k={k} n={n}: {found} {expected}");
-                        }
+                let mut out = vec![Lane::default(); n * k];
+                Step { t, rows: &rows, left: &left, columns: &columns, right: &tile, out: &mut out }.run(machine);
+                for l in 0..n {
+                    for c in 0..k {
+                        let at = |lanes: &[Lane], from: usize, s: usize| lanes[from + s / LANE].0[s % LANE];
+                        let expected: f64 = (0..t * LANE).map(|s| at(&left, c * t, s) * at(&tile, l * t, s)).sum();
+                        let found = total(&out[c * n + l]);
+                        assert!((found - expected).abs() < 1e-12, "{machine:?} {k} x {n}: {found} {expected}");
                     }
                 }
             }
