@@ -40,6 +40,7 @@ mod error;
 mod kernel;
 mod model;
 mod record;
+mod run;
 mod signals;
 mod spec;
 mod term;

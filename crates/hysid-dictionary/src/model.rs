@@ -1,9 +1,7 @@
 //! A sum of terms with coefficients: one step ahead and free run.
 
-use std::collections::HashMap;
-
-use crate::record::{FIRST_SIGN, next_sign};
-use crate::{Design, Dictionary, DictionaryError, Quantity, Record, Signal, Signals, Term};
+use crate::run::Compiled;
+use crate::{Design, Dictionary, DictionaryError, Record, Signals, Term};
 
 /// The polynomial model y\[n\] = sum of theta_i * term_i. Immutable.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,6 +9,7 @@ pub struct Model {
     signals: Signals,
     terms: Vec<Term>,
     theta: Vec<f64>,
+    compiled: Compiled,
 }
 
 /// A free run.
@@ -34,7 +33,8 @@ impl Model {
         if !terms.is_empty() {
             Dictionary::from_terms(signals.clone(), terms.iter().cloned())?;
         }
-        Ok(Self { signals, terms, theta })
+        let compiled = Compiled::new(&terms, &theta);
+        Ok(Self { signals, terms, theta, compiled })
     }
 
     /// The signals.
@@ -118,47 +118,6 @@ impl Model {
         let mut y = vec![f64::NAN; length];
         let begin = start.len().min(length);
         y[..begin].copy_from_slice(&start[..begin]);
-        let mut signs: HashMap<Signal, Vec<f64>> = HashMap::new();
-        for f in self.terms.iter().flat_map(Term::factors) {
-            if let Quantity::Sign(s) = f.quantity {
-                signs.entry(s).or_insert_with(|| vec![FIRST_SIGN; length]);
-            }
-        }
-        let threshold = |s: Signal| self.signals.name(s).map_or(0.0, |n| n.threshold);
-        for (&s, sign) in &mut signs {
-            let (x, known): (&[f64], usize) = match s {
-                Signal::Output => (&y, begin),
-                Signal::Input(i) => (inputs[i], length),
-            };
-            for n in 1..known {
-                sign[n] = next_sign(sign[n - 1], x[n] - x[n - 1], threshold(s));
-            }
-        }
-        for n in begin..length {
-            let mut sum = 0.0;
-            for (term, theta) in self.terms.iter().zip(&self.theta) {
-                let value = term.evaluate(|f| {
-                    let at = n - f.lag;
-                    let x: &[f64] = match f.quantity.signal() {
-                        Signal::Output => &y,
-                        Signal::Input(i) => inputs[i],
-                    };
-                    match f.quantity {
-                        Quantity::Value(_) => x[at],
-                        Quantity::Difference(_) => x[at] - x[at - 1],
-                        Quantity::Sign(s) => signs[&s][at],
-                    }
-                });
-                sum += theta * value;
-            }
-            if !(sum.abs() <= limit) {
-                return Ok(Run { y, diverged_at: Some(n) });
-            }
-            y[n] = sum;
-            if let Some(sign) = signs.get_mut(&Signal::Output).filter(|_| n > 0) {
-                sign[n] = next_sign(sign[n - 1], y[n] - y[n - 1], threshold(Signal::Output));
-            }
-        }
-        Ok(Run { y, diverged_at: None })
+        Ok(self.compiled.run(&self.signals, inputs, y, begin, limit))
     }
 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::Matrix;
+use crate::{Matrix, dot};
 
 /// What a forward selection needs before its first step.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,19 +126,4 @@ pub fn sum_over_blocks(
         }
     }
     total
-}
-
-/// The inner product of two vectors, in eight interleaved partial sums (so that it vectorises and errors grow slowly).
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let n = a.len().min(b.len());
-    let (a, b) = (&a[..n], &b[..n]);
-    let mut s = [0.0; 8];
-    let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in ca.zip(cb) {
-        for k in 0..8 {
-            s[k] += x[k] * y[k];
-        }
-    }
-    ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7])) + tail
 }

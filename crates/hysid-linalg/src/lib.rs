@@ -9,8 +9,10 @@ pub mod lanes;
 mod lstsq;
 mod matrix;
 mod tall;
+mod vector;
 
-pub use columns::{Columns, Start, dot, sum_over_blocks};
+pub use columns::{Columns, Start, sum_over_blocks};
 pub use lstsq::{LinalgError, Lstsq, lstsq, solve_factor};
 pub use matrix::Matrix;
 pub use tall::TallQr;
+pub use vector::{dot, leave_one_out_sum, subtract_multiple, take_out};

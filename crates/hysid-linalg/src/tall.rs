@@ -5,7 +5,7 @@
 //!
 //! Reference: Demmel, Grigori, Hoemmen, Langou, "Communication-optimal parallel and sequential QR" (2012).
 
-use crate::dot;
+use crate::{dot, subtract_multiple};
 
 /// The upper triangular factor R of a matrix that arrives in tiles of rows.
 #[derive(Debug, Clone)]
@@ -41,9 +41,7 @@ impl TallQr {
                 let y = &mut tail[(j - k - 1) * rows..(j - k) * rows];
                 let s = (v0 * self.r[j * n + k] + dot(x, y)) * scale;
                 self.r[j * n + k] -= s * v0;
-                for (b, a) in y.iter_mut().zip(x.iter()) {
-                    *b -= s * a;
-                }
+                subtract_multiple(s, x, y);
             }
             self.r[k * n + k] = beta;
         }

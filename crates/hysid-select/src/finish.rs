@@ -24,6 +24,7 @@ pub(crate) fn finish<C: Columns + ?Sized>(
     let pursuit = options.search == Search::MatchingPursuit;
     let mut curve: Vec<CurvePoint> = Vec::with_capacity(table.best.len());
     // Subsets that contain each other share one refit: walk from the longest down, chain by chain.
+    let mut chains: Vec<(Vec<usize>, Refit)> = Vec::new();
     let mut chain_end = table.best.len();
     let mut reversed: Vec<CurvePoint> = Vec::new();
     while chain_end > 0 {
@@ -45,6 +46,7 @@ pub(crate) fn finish<C: Columns + ?Sized>(
             });
         }
         chain_end = shortest - 1;
+        chains.push((order, fit));
     }
     curve.extend(reversed.into_iter().rev());
 
@@ -61,7 +63,11 @@ pub(crate) fn finish<C: Columns + ?Sized>(
 
     let subset = size.checked_sub(1).map_or(&[][..], |i| &table.best[i].columns);
     let terms = if pursuit { subset.to_vec() } else { in_order(moments, options, subset) };
-    let fit = refit(phi, y, &terms, energy, goal);
+    let fit = match chains.into_iter().find(|(order, _)| order.starts_with(&terms)) {
+        Some((_, fit)) => fit,
+        None => refit(phi, y, &terms, energy, goal),
+    };
+    let solution = fit.solution(size);
     let (err_deviation, smallest_pivot, first_bad) = check(moments, &terms, &fit);
     let doubtful_from = match options.search {
         Search::MatchingPursuit => None,
@@ -77,8 +83,8 @@ pub(crate) fn finish<C: Columns + ?Sized>(
     };
     Selection {
         steps: (0..terms.len()).map(step).collect(),
-        theta: fit.solution.theta.clone(),
-        unscaled_variance: fit.solution.unscaled_variance.clone(),
+        theta: solution.theta,
+        unscaled_variance: solution.unscaled_variance,
         terms,
         curve,
         stop,

@@ -8,8 +8,11 @@ use hysid_linalg::Columns;
 
 use crate::SelectError;
 
-/// How many columns of the Gram matrix one pass over the samples makes at most.
-const PER_PASS: usize = 8;
+/// How many columns of the Gram matrix one pass over the samples makes at most: on short data a pass costs more than its
+/// columns, on long data a column that is not needed costs more than a pass.
+const PER_PASS: (usize, usize) = (8, 2);
+/// Samples times candidates from which data are long.
+const LONG: usize = 20_000_000;
 
 /// The inner products of unit columns with each other and with the unit target.
 pub(crate) struct Moments<'a, C: ?Sized> {
@@ -53,7 +56,9 @@ impl<'a, C: Columns + ?Sized> Moments<'a, C> {
             return;
         }
         let mut which = vec![j];
-        which.extend(likely.into_iter().filter(|k| *k != j && !self.has(*k)).take(PER_PASS - 1));
+        let long = self.phi.rows().saturating_mul(self.phi.cols()) >= LONG;
+        let most = if long { PER_PASS.1 } else { PER_PASS.0 };
+        which.extend(likely.into_iter().filter(|k| *k != j && !self.has(*k)).take(most - 1));
         let columns = self.phi.gram_columns(&which);
         for (c, &k) in which.iter().enumerate() {
             let column = columns.col(c).iter().zip(&self.scale).map(|(g, s)| g * s * self.scale[k]).collect();

@@ -6,7 +6,11 @@
 
 use std::ops::Range;
 
-use hysid_linalg::{Columns, Lstsq, Matrix, TallQr, dot, lstsq, solve_factor, sum_over_blocks};
+use hysid_linalg::{
+    Columns, Lstsq, Matrix, TallQr, dot, leave_one_out_sum, lstsq, solve_factor, subtract_multiple, sum_over_blocks,
+    take_out,
+};
+use rayon::prelude::*;
 
 use crate::Criterion;
 use crate::criterion::{Facts, value};
@@ -20,7 +24,8 @@ pub(crate) struct Refit {
     /// Sum of squared errors on left-out blocks; NaN where not asked for.
     pub blocks: Vec<f64>,
     pub condition: Vec<f64>,
-    pub solution: Lstsq,
+    /// R of the columns and the target, column-major.
+    factor: Vec<f64>,
 }
 
 /// What a refit is to find out beside the residuals.
@@ -42,6 +47,20 @@ impl Goal {
 }
 
 impl Refit {
+    /// The least-squares solution with the first `k` columns.
+    pub fn solution(&self, k: usize) -> Lstsq {
+        let (n, w) = (self.err.len(), self.err.len() + 1);
+        // The rows of the target's column below k are residual when only k columns are used.
+        let mut r = vec![0.0; (k + 1) * (k + 1)];
+        for j in 0..k {
+            r[j * (k + 1)..j * (k + 1) + k].copy_from_slice(&self.factor[j * w..j * w + k]);
+        }
+        let target = &self.factor[n * w..];
+        r[k * (k + 1)..k * (k + 1) + k].copy_from_slice(&target[..k]);
+        r[k * (k + 1) + k] = target[k..].iter().map(|v| v * v).sum::<f64>().sqrt();
+        solve_factor(&r, k)
+    }
+
     /// What is known of the first `k` columns.
     pub fn facts(&self, k: usize, samples: usize) -> Facts {
         let (sse, press, blocks) = (self.sse[k - 1], self.press[k - 1], self.blocks[k - 1]);
@@ -55,7 +74,11 @@ impl Refit {
 }
 
 /// Rows that are factored at a time.
-const TILE: usize = 1024;
+const TILE: usize = 256;
+/// Blocks that long data are cut into, whatever the number of threads.
+const BLOCKS: usize = 16;
+/// Work (in flops) below which threads cost more than they bring.
+const SERIAL_BELOW: usize = 8_000_000;
 
 /// A leverage this close to 1 leaves nothing to leave out.
 const FULL_LEVERAGE: f64 = 1e-10;
@@ -84,7 +107,7 @@ pub(crate) fn refit<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize], 
     }
     let press = sum_over_blocks(rows, n, rows * n * n, |range, sums| {
         rotate(phi, y, columns, &r, range, |k, _, e, free| {
-            sums[k] = e.iter().zip(free).map(|(e, f)| (e / f.max(FULL_LEVERAGE)).powi(2)).sum();
+            sums[k] = leave_one_out_sum(e, free, FULL_LEVERAGE);
         });
     });
     let press = press.iter().map(|p| p / energy).collect();
@@ -92,7 +115,7 @@ pub(crate) fn refit<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize], 
         Goal::Samples => vec![f64::NAN; n],
         Goal::Blocks(blocks) => left_out_blocks(phi, y, columns, &r, &blocks).iter().map(|b| b / energy).collect(),
     };
-    Refit { err, sse, press, blocks, condition, solution: solve_factor(&r, n) }
+    Refit { err, sse, press, blocks, condition, factor: r }
 }
 
 /// Rows of Q, and with them the residual and 1 - h of every sample, for the first 1, 2, ... columns.
@@ -117,18 +140,12 @@ fn rotate<C: Columns + ?Sized>(
         phi.fill(columns[k], range.clone(), qk);
         for i in 0..k {
             let rik = r[k * w + i];
-            for (a, b) in qk.iter_mut().zip(&before[i * len..(i + 1) * len]) {
-                *a -= rik * b;
-            }
+            subtract_multiple(rik, &before[i * len..(i + 1) * len], qk);
         }
         let pivot = r[k * w + k];
         let inverse = if pivot > 0.0 { 1.0 / pivot } else { 0.0 };
         let g = r[n * w + k];
-        for ((a, e), f) in qk.iter_mut().zip(&mut residual).zip(&mut free) {
-            *a *= inverse;
-            *e -= *a * g;
-            *f -= *a * *a;
-        }
+        take_out(inverse, g, qk, &mut residual, &mut free);
         each(k, &q[..(k + 1) * len], &residual, &free);
     }
 }
@@ -188,17 +205,32 @@ fn left_out_blocks<C: Columns + ?Sized>(
 /// The factor R of `[columns y]`, column-major.
 pub(crate) fn factor<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize]) -> Vec<f64> {
     let (w, rows) = (columns.len() + 1, phi.rows());
-    let mut qr = TallQr::new(w);
-    let mut tile = vec![0.0; TILE * w];
-    let mut at = 0;
-    while at < rows {
-        let len = TILE.min(rows - at);
-        for (c, &j) in columns.iter().enumerate() {
-            phi.fill(j, at..at + len, &mut tile[c * len..(c + 1) * len]);
+    let block = rows.div_ceil(BLOCKS).max(8 * TILE);
+    let one = |b: usize| {
+        let (mut at, end) = (b * block, ((b + 1) * block).min(rows));
+        let mut qr = TallQr::new(w);
+        let mut tile = vec![0.0; TILE.min(end - at) * w];
+        while at < end {
+            let len = TILE.min(end - at);
+            for (c, &j) in columns.iter().enumerate() {
+                phi.fill(j, at..at + len, &mut tile[c * len..(c + 1) * len]);
+            }
+            tile[(w - 1) * len..w * len].copy_from_slice(&y[at..at + len]);
+            qr.push(len, &mut tile[..w * len]);
+            at += len;
         }
-        tile[(w - 1) * len..w * len].copy_from_slice(&y[at..at + len]);
-        qr.push(len, &mut tile[..w * len]);
-        at += len;
+        qr
+    };
+    let blocks = rows.div_ceil(block);
+    let parts: Vec<TallQr> = if 2 * rows * w * w < SERIAL_BELOW || blocks < 2 || rayon::current_num_threads() < 2 {
+        (0..blocks).map(one).collect()
+    } else {
+        (0..blocks).into_par_iter().map(one).collect()
+    };
+    let mut parts = parts.into_iter();
+    let mut whole = parts.next().unwrap_or_else(|| TallQr::new(w));
+    for part in parts {
+        whole.merge(&part);
     }
-    qr.into_factor()
+    whole.into_factor()
 }

@@ -1,0 +1,101 @@
+//! Plain loops over vectors, compiled for AVX-512 too and chosen at run time; the arithmetic is the same in both forms.
+
+/// Writes a function in both forms: the loop, compiled for the baseline and for AVX-512.
+macro_rules! both_forms {
+    ($(#[$doc:meta])* pub fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)? $body:block) => {
+        $(#[$doc])*
+        pub fn $name($($arg: $type),*) $(-> $out)? {
+            #[inline(always)]
+            fn plain($($arg: $type),*) $(-> $out)? $body
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f")]
+            fn wide($($arg: $type),*) $(-> $out)? {
+                plain($($arg),*)
+            }
+            #[cfg(target_arch = "x86_64")]
+            if is_x86_feature_detected!("avx512f") {
+                // SAFETY: the processor has the feature.
+                return unsafe { wide($($arg),*) };
+            }
+            plain($($arg),*)
+        }
+    };
+}
+
+both_forms! {
+    /// The inner product of two vectors, in sixteen interleaved partial sums (so that it vectorises and errors grow slowly).
+    pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+        let n = a.len().min(b.len());
+        let (ca, cb) = (a[..n].chunks_exact(16), b[..n].chunks_exact(16));
+        let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
+        let mut s = [0.0; 16];
+        for (x, y) in ca.zip(cb) {
+            for k in 0..16 {
+                s[k] += x[k] * y[k];
+            }
+        }
+        for half in [8, 4, 2, 1] {
+            for k in 0..half {
+                s[k] += s[k + half];
+            }
+        }
+        s[0] + tail
+    }
+}
+
+both_forms! {
+    /// y -= a x.
+    pub fn subtract_multiple(a: f64, x: &[f64], y: &mut [f64]) {
+        for (y, x) in y.iter_mut().zip(x) {
+            *y -= a * x;
+        }
+    }
+}
+
+both_forms! {
+    /// Turns a column into a unit direction and takes it out: q *= scale, e -= gain q, free -= q^2.
+    pub fn take_out(scale: f64, gain: f64, q: &mut [f64], e: &mut [f64], free: &mut [f64]) {
+        for ((q, e), f) in q.iter_mut().zip(e).zip(free) {
+            *q *= scale;
+            *e -= *q * gain;
+            *f -= *q * *q;
+        }
+    }
+}
+
+both_forms! {
+    /// The sum of (e / max(free, floor))^2.
+    pub fn leave_one_out_sum(e: &[f64], free: &[f64], floor: f64) -> f64 {
+        let n = e.len().min(free.len());
+        let (ce, cf) = (e[..n].chunks_exact(8), free[..n].chunks_exact(8));
+        let square = |e: f64, f: f64| {
+            let loo = e / if f > floor { f } else { floor };
+            loo * loo
+        };
+        let tail: f64 = ce.remainder().iter().zip(cf.remainder()).map(|(e, f)| square(*e, *f)).sum();
+        let mut s = [0.0; 8];
+        for (e, f) in ce.zip(cf) {
+            for k in 0..8 {
+                s[k] += square(e[k], f[k]);
+            }
+        }
+        ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7])) + tail
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_of_any_length() {
+        for n in [0, 1, 7, 8, 15, 16, 33, 100] {
+            let a: Vec<f64> = (0..n).map(|i| i as f64).collect();
+            let b = vec![2.0; n];
+            let expected: f64 = a.iter().sum::<f64>() * 2.0;
+            assert_eq!(dot(&a, &b), expected, "{n}");
+            let squares: f64 = a.iter().map(|x| x * x / 4.0).sum();
+            approx::assert_relative_eq!(leave_one_out_sum(&a, &b, 1e-9), squares, max_relative = 1e-14);
+        }
+    }
+}
