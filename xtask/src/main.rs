@@ -1,5 +1,6 @@
 //! Tasks of this repository; `cargo xtask --help` lists them.
 
+mod bench;
 mod catalogue;
 mod ci;
 mod layers;
@@ -20,6 +21,7 @@ struct Cli {
 /// One variant for each module beside this file.
 #[derive(Debug, Subcommand)]
 enum Task {
+    Bench(bench::Args),
     Catalogue(catalogue::Args),
     Ci(ci::Args),
     /// Check the house rules of `xtask/layers.toml`.
@@ -35,6 +37,7 @@ pub fn root() -> PathBuf {
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().task {
+        Task::Bench(args) => bench::run(&args),
         Task::Catalogue(args) => catalogue::run(&args),
         Task::Ci(args) => ci::run(&args),
         Task::Prove(args) => prove::run(&args),

@@ -102,8 +102,8 @@ impl Plan {
     fn accumulate(&self, work: &mut Work, k: usize, machine: Machine) {
         let together = (GROUP / k).max(1);
         let places = self.order.len();
-        let Work { tile, weights, heads, sums, rows, .. } = work;
-        for group in self.nodes.chunks(together) {
+        let Work { tile, weights, heads, sums, rows, common, .. } = work;
+        for (group, &common) in self.nodes.chunks(together).zip(&*common) {
             for (g, node) in group.iter().enumerate() {
                 for c in 0..k {
                     let to = &mut heads[(g * k + c) * T..(g * k + c + 1) * T];
@@ -117,11 +117,7 @@ impl Plan {
                     }
                 }
             }
-            // The tails that all heads of the group end with; what comes before is each head's own.
             let first = &group[0];
-            let common = (0..first.tails.len())
-                .find(|&n| group.iter().all(|node| node.tails.ends_with(&first.tails[n..])))
-                .map_or(0, |n| first.tails.len() - n);
             for (g, node) in group.iter().enumerate() {
                 let own = node.tails.len() - common;
                 rows.clear();
@@ -137,6 +133,13 @@ impl Plan {
             Step { t: T, rows, left: heads, columns, right: tile, out: sums }.run(machine);
         }
     }
+}
+
+/// How many tails all heads of the group end with.
+fn common_tails(group: &[Node]) -> usize {
+    let Some(shortest) = group.iter().min_by_key(|n| n.tails.len()) else { return 0 };
+    let ends = |n: usize| group.iter().all(|node| node.tails.ends_with(&shortest.tails[shortest.tails.len() - n..]));
+    (0..=shortest.tails.len()).rev().find(|&n| ends(n)).unwrap_or(0)
 }
 
 fn multiply_into(to: &mut [Lane], by: &[Lane]) {
@@ -156,6 +159,8 @@ struct Work {
     /// `sums[c * places + place]`.
     sums: Vec<Lane>,
     rows: Vec<Row>,
+    /// For each group of heads, how many tails all of them end with; what comes before is each head's own.
+    common: Vec<usize>,
     plain: Vec<f64>,
 }
 
@@ -168,6 +173,7 @@ impl Work {
             heads: lanes(k * (GROUP / k).max(1) * T),
             sums: lanes(plan.order.len() * k),
             rows: Vec::new(),
+            common: plan.nodes.chunks((GROUP / k).max(1)).map(common_tails).collect(),
             plain: vec![0.0; TILE],
         }
     }
