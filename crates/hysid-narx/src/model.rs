@@ -161,9 +161,43 @@ impl NarxModel {
 
     /// The prediction of each sample from the recorded ones before it, with the noise model where there is one.
     ///
+    /// A model at a reduced rate predicts each sample from those one of its own steps, and more, before it.
+    ///
     /// # Errors
     /// A record that does not fit the model's inputs.
     pub fn one_step(&self, record: &Record<'_>) -> Result<Vec<f64>, NarxError> {
+        let each = |r: &Record<'_>| Ok(Prediction { y: self.one_step_at_rate(r)?, diverged_at: None });
+        Ok(self.by_phase(record, each)?.y)
+    }
+
+    /// Runs `predict` on each of the interleaved recordings that the model's rate leaves, and puts the results together.
+    ///
+    /// A model that moves in steps of L samples predicts all samples that way, without interpolation.
+    fn by_phase(
+        &self,
+        record: &Record<'_>,
+        predict: impl Fn(&Record<'_>) -> Result<Prediction, NarxError>,
+    ) -> Result<Prediction, NarxError> {
+        let l = self.parts.decimation;
+        if l == 1 {
+            return predict(record);
+        }
+        let mut whole = Prediction { y: vec![f64::NAN; record.y.len()], diverged_at: None };
+        for phase in 0..l.min(record.y.len()) {
+            let take = |x: &[f64]| x.iter().copied().skip(phase).step_by(l).collect::<Vec<f64>>();
+            let (y, inputs) = (take(record.y), record.inputs.iter().map(|u| take(u)).collect::<Vec<_>>());
+            let part = predict(&Record::new(&y, inputs.iter().map(Vec::as_slice).collect()))?;
+            for (n, v) in part.y.into_iter().enumerate() {
+                whole.y[phase + n * l] = v;
+            }
+            if let Some(n) = part.diverged_at.map(|n| phase + n * l) {
+                whole.diverged_at = Some(whole.diverged_at.map_or(n, |d| d.min(n)));
+            }
+        }
+        Ok(whole)
+    }
+
+    fn one_step_at_rate(&self, record: &Record<'_>) -> Result<Vec<f64>, NarxError> {
         let bank = Bank::new(record, &self.parts.derived, &self.parts.signals)?;
         let (program, theta, reach) = (self.program(), self.theta(), self.reach());
         let noise = Program::new(&self.parts.noise.iter().map(|t| t.term.clone()).collect::<Vec<_>>());
@@ -197,19 +231,19 @@ impl NarxModel {
     /// # Errors
     /// A record that does not fit the model's inputs.
     pub fn free_run(&self, record: &Record<'_>) -> Result<Prediction, NarxError> {
-        self.simulate(record, None)
+        self.by_phase(record, |r| self.simulate(r, None))
     }
 
-    /// Each sample predicted from what was recorded up to `k` samples before it.
+    /// Each sample predicted from what was recorded up to `k` samples before it (a whole number of the model's own steps).
     ///
     /// # Errors
     /// A record that does not fit the model's inputs; `k` of 0.
     pub fn k_step(&self, record: &Record<'_>, k: usize) -> Result<Prediction, NarxError> {
         let bad = |problem: &str| NarxError::BadRecord { record: 0, problem: problem.into() };
-        match k {
+        match k.div_ceil(self.parts.decimation) {
             0 => Err(bad("a prediction looks at least 1 sample ahead")),
             1 => Ok(Prediction { y: self.one_step(record)?, diverged_at: None }),
-            _ => self.simulate(record, Some(k)),
+            steps => self.by_phase(record, |r| self.simulate(r, Some(steps))),
         }
     }
 

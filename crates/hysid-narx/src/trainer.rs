@@ -1,12 +1,12 @@
 //! Estimation and growth of a model on recordings: least squares, refinement, the next term, the least needed term.
 
 use hysid_dictionary::{Record, Signals, Term};
-use hysid_linalg::{Matrix, lstsq};
+use hysid_linalg::{Matrix, TallQr, lstsq};
 
 use crate::normal::Normal;
 use crate::program::Program;
 use crate::refine::{self, Point, refine};
-use crate::run::{Rules, Trace, Window, bank_of, run_all, sensitivities};
+use crate::run::{Rules, Trace, Window, bank_of, run, run_all, sensitivities};
 use crate::{Bank, Derived, NarxError};
 
 /// Terms with coefficients and the derived inputs that they may use.
@@ -163,6 +163,44 @@ impl Trainer {
         Ok(Fit { terms: terms.to_vec(), theta: solution.theta, derived: self.derived.clone() })
     }
 
+    /// The error reduction ratio of each term, in this order, one step ahead over the windows.
+    ///
+    /// The share of the output's sum of squares that the term's part orthogonal to those before it explains.
+    ///
+    /// # Errors
+    /// Windows of recordings that there are not.
+    pub fn error_reduction(&self, terms: &[Term], windows: &[Window]) -> Result<Vec<f64>, NarxError> {
+        const TILE: usize = 1024;
+        let program = Program::new(terms);
+        let width = terms.len() + 1;
+        let mut qr = TallQr::new(width);
+        let mut energy = 0.0;
+        for window in windows {
+            let bank = bank_of(&self.banks, window.record)?;
+            let inputs = program.inputs(bank)?;
+            let mut v = vec![0.0; program.factors.len()];
+            let first = window.range.start + self.rules.given;
+            let mut from = first;
+            while from < window.range.end {
+                let rows = TILE.min(window.range.end - from);
+                let mut tile = vec![0.0; rows * width];
+                for (i, n) in (from..from + rows).enumerate() {
+                    program.factor_values(n, n, &bank.y, &bank.y_sign, &inputs, &mut v);
+                    for k in 0..terms.len() {
+                        tile[k * rows + i] = program.term(k, &v);
+                    }
+                    tile[(width - 1) * rows + i] = bank.y[n];
+                    energy += bank.y[n] * bank.y[n];
+                }
+                qr.push(rows, &mut tile);
+                from += rows;
+            }
+        }
+        let r = qr.into_factor();
+        let last = &r[(width - 1) * width..];
+        Ok(last[..terms.len()].iter().map(|q| q * q / energy.max(f64::MIN_POSITIVE)).collect())
+    }
+
     /// The free-run error of `fit` over the windows.
     ///
     /// # Errors
@@ -171,6 +209,41 @@ impl Trainer {
         self.enter(&fit.derived);
         let outcome = run_all(&Program::new(&fit.terms), &fit.theta, &self.banks, windows, self.rules)?;
         Ok(RunError { rmse: outcome.rmse(), diverged: outcome.diverged })
+    }
+
+    /// The largest distance of each window's free run from `centre`; infinite where it diverged.
+    ///
+    /// # Errors
+    /// Windows of recordings that there are not.
+    pub fn peaks(&mut self, fit: &Fit, windows: &[Window], centre: f64) -> Result<Vec<f64>, NarxError> {
+        self.enter(&fit.derived);
+        let program = Program::new(&fit.terms);
+        windows
+            .iter()
+            .map(|w| {
+                let trace = run(&program, &fit.theta, bank_of(&self.banks, w.record)?, &w.range, self.rules)?;
+                let largest = trace.y.iter().fold(0.0f64, |m, y| m.max((y - centre).abs()));
+                Ok(if trace.diverged.is_some() { f64::INFINITY } else { largest })
+            })
+            .collect()
+    }
+
+    /// The error of each window's free run at its last sample; infinite where it diverged.
+    ///
+    /// # Errors
+    /// Windows of recordings that there are not.
+    pub fn last_errors(&mut self, fit: &Fit, windows: &[Window]) -> Result<Vec<f64>, NarxError> {
+        self.enter(&fit.derived);
+        let program = Program::new(&fit.terms);
+        let mut errors = Vec::with_capacity(windows.len());
+        for w in windows {
+            let bank = bank_of(&self.banks, w.record)?;
+            let trace = run(&program, &fit.theta, bank, &w.range, self.rules)?;
+            if let (Some(p), Some(y)) = (trace.y.last(), bank.y[w.range.clone()].last()) {
+                errors.push(if trace.diverged.is_some() { f64::INFINITY } else { p - y });
+            }
+        }
+        Ok(errors)
     }
 
     /// The fit after at most `steps` steps of simulation-error refinement over the windows, and its free-run error.

@@ -165,6 +165,26 @@ proptest! {
 }
 
 #[test]
+fn a_model_at_a_reduced_rate_predicts_every_sample() {
+    let mut p = parts(&[("y[n-1]", 0.5), ("u[n]", 1.0)], vec![]);
+    let plain = NarxModel::new(p.clone()).unwrap();
+    p.decimation = 3;
+    let model = NarxModel::new(p).unwrap();
+    let (u, y) = (input(20, 1), input(20, 2));
+    let whole = model.free_run(&Record::siso(&u, &y)).unwrap().y;
+    let ahead = model.k_step(&Record::siso(&u, &y), 4).unwrap().y;
+    for phase in 0..3 {
+        let take = |x: &[f64]| x.iter().copied().skip(phase).step_by(3).collect::<Vec<_>>();
+        let (pu, py) = (take(&u), take(&y));
+        let run = plain.free_run(&Record::siso(&pu, &py)).unwrap().y;
+        let two = plain.k_step(&Record::siso(&pu, &py), 2).unwrap().y;
+        assert_eq!(format!("{:?}", take(&whole)), format!("{run:?}"));
+        assert_eq!(format!("{:?}", take(&ahead)), format!("{two:?}"));
+    }
+    assert!(whole[..3].iter().all(|v| v.is_nan()) && whole[3..].iter().all(|v| v.is_finite()));
+}
+
+#[test]
 fn terms_may_name_columns() {
     let p = parts(&[("y_mm[n-1]*u_V[n]", 1.0)], vec![]);
     assert_eq!(p.signals.format(&p.coefficients[0].term), "y[n-1]*u[n]");

@@ -20,6 +20,14 @@ pub(crate) struct Family {
     pub candidates: Vec<Term>,
 }
 
+impl Family {
+    /// Samples that start a run of any of its models.
+    pub(crate) fn given(&self) -> usize {
+        let reach = self.linear.iter().chain(&self.candidates).map(Term::reach).max().unwrap_or(0);
+        reach.max(1)
+    }
+}
+
 /// A factor or a product that counts as one, as the magnitude of a difference: its difference times its sign.
 pub(crate) type Atom = Vec<Factor>;
 

@@ -28,6 +28,9 @@ pub(crate) struct Budget {
 /// A term whose loss would raise the squared error by less than this share goes.
 const NEEDED: f64 = 2e-4;
 
+/// Refinement steps of a linear start.
+const START_STEPS: usize = 20;
+
 /// The linear start of a family, refined; `None` where no stable one was found.
 pub(crate) fn start(
     trainer: &mut Trainer,
@@ -35,9 +38,25 @@ pub(crate) fn start(
     search: &[Window],
     hold: &[Window],
 ) -> Result<Option<Stage>, NarxError> {
-    let fit = trainer.least_squares(&family.linear, search)?;
+    start_from(trainer, family, None, search, hold, START_STEPS, Refine::Coefficients)
+}
+
+/// The same from a known fit, or from least squares.
+pub(crate) fn start_from(
+    trainer: &mut Trainer,
+    family: &Family,
+    from: Option<Fit>,
+    search: &[Window],
+    hold: &[Window],
+    steps: usize,
+    refine: Refine,
+) -> Result<Option<Stage>, NarxError> {
+    let fit = match from {
+        Some(fit) => fit,
+        None => trainer.least_squares(&family.linear, search)?,
+    };
     let Some(fit) = stabilised(trainer, fit, search)? else { return Ok(None) };
-    let (fit, taught) = trainer.refine(fit, search, 20, Refine::Coefficients)?;
+    let (fit, taught) = trainer.refine(fit, search, steps, refine)?;
     let held = trainer.error(&fit, hold)?;
     Ok(Some(Stage { fit, taught, held }))
 }
@@ -72,7 +91,8 @@ pub(crate) fn grow(
     let mut stages = vec![first];
     let mut since_best = 0;
     let mut best = stages[0].held.rmse;
-    loop {
+    // Pruning can take back what growth adds: the number of rounds is bounded, too.
+    for _ in 0..2 * budget.terms {
         let current = &stages[stages.len() - 1];
         if current.fit.terms.len() >= budget.terms || since_best >= budget.patience {
             break;

@@ -10,16 +10,22 @@
 //! 3. The best families grow on; the stage with the lowest held-out error, or the shortest one close to it, is the model.
 //! 4. It is refined on all estimation samples, and checked: does it still run, does it stay, how far does it hold.
 
+mod blocks;
 mod data;
+mod desk;
+mod families;
 mod family;
 mod growth;
+mod linear;
 mod options;
+mod rates;
 mod recipe;
 mod report;
 mod split;
+mod verify;
 
 pub use options::{Criterion, Decimate, Factors, LARGEST_DEGREE, LARGEST_LAG, LARGEST_TERMS, Options};
-pub use recipe::{Identified, Source, identify};
+pub use recipe::{Identified, Progress, Source, identify};
 pub use report::{Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, Role, Series, TermLine};
 
 use hysid_narx::NarxError;
@@ -42,6 +48,9 @@ pub enum IdentifyError {
         /// The column.
         column: String,
     },
+    /// A signal without a single sample.
+    #[error("column `{0}` has no sample")]
+    Empty(String),
     /// A signal that never changes.
     #[error("column `{column}` is constant ({value}): there is nothing to learn from it")]
     Constant {

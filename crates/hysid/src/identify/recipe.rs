@@ -1,14 +1,19 @@
-//! The recipe: families compete on the held-out free run.
+//! The recipe: families compete on the held-out free run, the best grow on, the winner is refined on everything.
 
-use hysid_dictionary::{Factor, Signal, SignalName, Signals};
-use hysid_narx::{Coefficient, Derived, Fit, Law, NarxModel, Parts, Refine, Trainer, Window};
+use hysid_narx::{Coefficient, Fit, NarxModel, Parts, Refine};
 use hysid_signal::Recording;
+use rayon::prelude::*;
 
-use super::data::{Samples, gather, spread};
-use super::family::{self, Atom, Family};
+use super::blocks::best_block;
+use super::data::{Samples, gather};
+use super::desk::Desk;
+use super::family::Family;
+use super::families::families;
 use super::growth::{Budget, Stage, grow, start};
-use super::options::{Factors, Options};
-use super::split::{Split, split};
+use super::linear::{Linear, best, ladder};
+use super::options::Options;
+use super::rates::{PREFER_OWN_RATE, rates};
+use super::verify::{horizon, warnings};
 use super::{Horizon, IdentifyError};
 
 /// What to learn from: recordings and the names of their columns.
@@ -41,254 +46,264 @@ pub struct Identified {
     pub path: Vec<(usize, f64, f64)>,
 }
 
-/// Samples that the first round of the competition looks at.
-const FIRST_LOOK: usize = 4000;
-/// Samples that the second round looks at.
-const SECOND_LOOK: usize = 9000;
-/// Terms of a model whose number nobody has decided.
+/// Told what is being done, from any thread.
+pub type Progress<'a> = &'a (dyn Fn(&str) + Sync);
+
+/// Samples that the first and the second round look at.
+const LOOKS: [usize; 2] = [4000, 9000];
+/// Terms that a family grows by in the first round.
+const FIRST_TERMS: usize = 8;
+/// Families that grow on.
+const KEPT: usize = 3;
+/// Terms of a model whose number nobody has decided: at most this, or the linear terms and half as many again.
 const MOST_TERMS: usize = 25;
+/// The shortest model whose score is within this share of the lowest is taken.
+const NEAR: f64 = 0.02;
+/// Families whose scores differ by less than this share are equally good.
+const EQUAL: f64 = 0.05;
+/// Samples at the beginning of a stretch during which derived inputs find their state, at most; and as a share of it.
+const SETTLE: (usize, f64) = (200, 0.1);
+/// Refinement steps on all samples.
+const FINAL_STEPS: usize = 12;
 
 /// From recordings a model whose free run is good and stable on held-out blocks of them.
 ///
 /// # Errors
 /// [`IdentifyError`]: what is wrong with the recordings or the options.
-pub fn identify(
-    source: Source<'_>,
-    options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
-) -> Result<Identified, IdentifyError> {
+pub fn identify(source: Source<'_>, options: &Options, progress: Progress<'_>) -> Result<Identified, IdentifyError> {
     if let Some(problem) = options.problem() {
         return Err(IdentifyError::Option(problem));
     }
-    let samples = gather(source.recordings, source.inputs, source.output)?;
-    let y = spread(samples.iter().flat_map(|s| &s.y)).ok_or(IdentifyError::Nothing("sample"))?;
-    let desk = Desk { source, samples: &samples, y_size: y.0.abs() + 10.0 * y.1, options };
-    desk.identify(progress)
-}
-
-struct Desk<'a> {
-    source: Source<'a>,
-    samples: &'a [Samples],
-    y_size: f64,
-    options: &'a Options,
-}
-
-impl Desk<'_> {
-    fn signals(&self, derived: &[Derived]) -> Result<Signals, IdentifyError> {
-        let inputs: Vec<&str> = self.source.inputs.iter().map(String::as_str).collect();
-        let base = Signals::from_columns(self.source.output, &inputs).map_err(hysid_narx::NarxError::from)?;
-        let mut all = base.inputs().to_vec();
-        all.extend(derived.iter().map(|d| SignalName {
-            symbol: d.symbol.clone(),
-            column: d.symbol.clone(),
-            threshold: 0.0,
-        }));
-        Ok(Signals::new(base.output().clone(), all).map_err(hysid_narx::NarxError::from)?)
+    if source.inputs.is_empty() {
+        return Err(IdentifyError::Nothing("input"));
     }
-
-    fn trainer(&self, derived: &[Derived], given: usize) -> Result<Trainer, IdentifyError> {
-        let records: Vec<_> = self.samples.iter().map(Samples::record).collect();
-        Ok(Trainer::new(self.signals(derived)?, derived.to_vec(), &records, given, self.y_size)?)
-    }
-
-    fn identify(&self, progress: &(dyn Fn(&str) + Sync)) -> Result<Identified, IdentifyError> {
-        let inputs = self.source.inputs.len();
-        let mut decisions = Vec::new();
-        let first_lag = self.options.input_delay.unwrap_or(0);
-        // 1. Linear models.
-        let mut linear: Vec<(usize, usize, Stage)> = Vec::new();
-        for n in [1usize, 2, 3, 5, 8, 12, 20] {
-            let (ny, nu) = (self.options.lags_output.unwrap_or(n), self.options.lags_input.unwrap_or(n));
-            if linear.iter().any(|l| (l.0, l.1) == (ny, nu)) {
-                continue;
-            }
-            let given = ny.max(nu) + 2;
-            let mut trainer = self.trainer(&[], given)?;
-            let s = split(&trainer.whole_windows(), given, FIRST_LOOK);
-            let family = Family {
-                name: "linear".into(),
-                ny,
-                nu,
-                derived: vec![],
-                linear: family::linear(inputs, ny, first_lag..=nu),
-                candidates: vec![],
-            };
-            progress(&format!("linear models: lags {ny} and {nu}"));
-            let Ok(Some(stage)) = start(&mut trainer, &family, &s.search, &s.hold) else { continue };
-            decisions.push(format!(
-                "linear, lags {ny} and {nu}: held-out free run {:.5e}, taught {:.5e}",
-                stage.held.rmse, stage.taught.rmse
-            ));
-            let hopeless = linear.last().is_some_and(|l| stage.held.rmse > 0.98 * l.2.held.rmse) && n > 5;
-            linear.push((ny, nu, stage));
-            if hopeless {
-                break;
-            }
-        }
-        let best = linear.iter().map(|l| l.2.held.rmse).fold(f64::INFINITY, f64::min);
-        let Some((ny, nu, _)) = linear.iter().find(|l| l.2.held.rmse <= 1.05 * best) else {
-            return Err(IdentifyError::Nothing("stable linear model"));
-        };
-        // 2. Families.
-        let mut lags = vec![(2, 2), (3, 3), (5, 5)];
-        if self.options.lags_output.is_some() || self.options.lags_input.is_some() {
-            lags = vec![(*ny, *nu)];
-        } else if !lags.contains(&(*ny, *nu)) {
-            lags.push((*ny, *nu));
-        }
-        let mut families = Vec::new();
-        for (ny, nu) in lags {
-            families.extend(self.families(ny, nu, first_lag));
-        }
-        let mut first: Vec<(Family, Stage, Split)> = Vec::new();
-        for family in families {
-            progress(&format!("family {} of {}", first.len() + 1, family.name));
-            let given = family.ny.max(family.nu) + 2;
-            let mut trainer = self.trainer(&family.derived, given)?;
-            let s = split(&trainer.whole_windows(), given, FIRST_LOOK);
-            let Some(stage) = start(&mut trainer, &family, &s.search, &s.hold)? else { continue };
-            let budget = Budget { terms: family.linear.len() + 8, patience: 8, steps: 4 };
-            let t = std::time::Instant::now();
-            let path = grow(&mut trainer, &family, stage, &s.search, &s.hold, budget, Refine::Coefficients)?;
-            let Some(best) = path.into_iter().min_by(|a, b| a.held.rmse.total_cmp(&b.held.rmse)) else { continue };
-            decisions.push(format!(
-                "{}: {} candidates, first look {} terms, held-out {:.5e} taught {:.5e}",
-                family.name,
-                family.candidates.len(),
-                best.fit.terms.len(),
-                best.held.rmse,
-                best.taught.rmse
-            ));
-            first.push((family, best, s));
-        }
-        first.sort_by(|a, b| a.1.held.rmse.total_cmp(&b.1.held.rmse));
-        first.truncate(2);
-        // 3. Grow on.
-        let mut chosen: Option<(Family, Stage)> = None;
-        for (family, stage, _) in first {
-            let given = family.ny.max(family.nu) + 2;
-            let mut trainer = self.trainer(&family.derived, given)?;
-            let s = split(&trainer.whole_windows(), given, SECOND_LOOK);
-            let most = self.options.terms.unwrap_or(MOST_TERMS.max(family.linear.len() + 12));
-            let budget = Budget { terms: most, patience: 6, steps: 6 };
-            progress(&format!("growing {}", family.name));
-            let t = std::time::Instant::now();
-            let (fit, taught) = trainer.refine(stage.fit, &s.search, 8, Refine::Coefficients)?;
-            let held = trainer.error(&fit, &s.hold)?;
-            let path = grow(
-                &mut trainer,
-                &family,
-                Stage { fit, taught, held },
-                &s.search,
-                &s.hold,
-                budget,
-                Refine::Coefficients,
-            )?;
-            let lowest = path.iter().map(|p| p.held.rmse).fold(f64::INFINITY, f64::min);
-            let Some(pick) = path.into_iter().find(|p| p.held.rmse <= 1.01 * lowest) else { continue };
-            decisions.push(format!(
-                "{}: second look {} terms, held-out {:.5e} taught {:.5e}",
-                family.name,
-                pick.fit.terms.len(),
-                pick.held.rmse,
-                pick.taught.rmse
-            ));
-            if chosen.as_ref().is_none_or(|c| pick.held.rmse < c.1.held.rmse) {
-                chosen = Some((family, pick));
-            }
-        }
-        let Some((family, stage)) = chosen else { return Err(IdentifyError::Nothing("stable model")) };
-        // 4. Everything.
-        let given = family.ny.max(family.nu) + 2;
-        let mut trainer = self.trainer(&family.derived, given)?;
-        let whole = trainer.whole_windows();
-        progress("refining on all samples");
-        let (fit, error) = trainer.refine(stage.fit.clone(), &whole, 8, Refine::CoefficientsAndDerived)?;
-        decisions.push(format!("refined on everything: {:.5e}", error.rmse));
-        let held_rmse = stage.held.rmse;
-        let model = self.model(&mut trainer, fit, &whole)?;
-        let (lny, lnu, lstage) =
-            linear.iter().min_by(|a, b| a.2.held.rmse.total_cmp(&b.2.held.rmse)).expect("checked above");
-        let mut trainer = self.trainer(&[], lny.max(lnu) + 2)?;
-        let whole = trainer.whole_windows();
-        let (fit, _) = trainer.refine(lstage.fit.clone(), &whole, 10, Refine::Coefficients)?;
-        let linear = self.model(&mut trainer, fit, &whole)?;
-        let horizon = Horizon { steps: 0, whole_run: false };
-        Ok(Identified { model, linear, decisions, warnings: vec![], held_rmse, horizon, path: vec![] })
-    }
-
-    fn model(&self, trainer: &mut Trainer, fit: Fit, windows: &[Window]) -> Result<NarxModel, IdentifyError> {
-        let errors = trainer.standard_errors(&fit, windows)?;
-        let coefficients = fit
-            .terms
-            .iter()
-            .zip(&fit.theta)
-            .zip(errors)
-            .map(|((t, &theta), standard_error)| Coefficient { term: t.clone(), theta, standard_error, err: f64::NAN })
-            .collect();
-        let clock = self.source.recordings.first().map(|r| r.clock().period_s);
-        Ok(NarxModel::new(Parts {
-            signals: trainer.signals().clone(),
-            derived: fit.derived,
-            coefficients,
-            noise: vec![],
-            limit: self.y_size,
-            period_s: clock,
-            decimation: 1,
-        })?)
-    }
-
-    fn families(&self, ny: usize, nu: usize, first_lag: usize) -> Vec<Family> {
-        let inputs = self.source.inputs.len();
-        let degree = self.options.degree.unwrap_or(3);
-        let linear = family::linear(inputs, ny, first_lag..=nu);
-        let (nyn, nun) = (ny.min(5), nu.min(5));
-        let atoms = family::lag_atoms(inputs, nyn, first_lag..=nun);
-        let fitted = |mut atoms: Vec<Atom>, limit: usize| {
-            while family::count(atoms.len(), degree) > limit && atoms.len() > 3 {
-                atoms.pop();
-            }
-            atoms
-        };
-        let mut out = Vec::new();
-        let make = |name: String, derived: Vec<Derived>, atoms: Vec<Atom>| Family {
-            name,
-            ny,
-            nu,
-            derived,
-            linear: linear.clone(),
-            candidates: family::products(&atoms, degree),
-        };
-        if self.options.factors != Factors::Hysteresis {
-            out.push(make(format!("polynomial, lags {ny} and {nu}"), vec![], fitted(atoms.clone(), 700)));
-        }
-        if self.options.factors != Factors::Polynomial && ny <= 3 {
-            let mut extra: Vec<Atom> = Vec::new();
-            for i in 0..inputs {
-                extra.extend(family::reversal_atoms(Signal::Input(i), first_lag));
-            }
-            let mut with = extra;
-            with.extend(atoms.clone());
-            out.push(make(format!("input reversals, lags {ny} and {nu}"), vec![], fitted(with, 500)));
-            let mut with: Vec<Atom> = (1..=2).flat_map(|l| family::reversal_atoms(Signal::Output, l)).collect();
-            with.extend(atoms.clone());
-            out.push(make(format!("output reversals, lags {ny} and {nu}"), vec![], fitted(with, 500)));
-            let mut derived = Vec::new();
-            let mut with: Vec<Atom> = Vec::new();
-            for i in 0..inputs {
-                let std = spread(self.samples.iter().flat_map(|s| &s.inputs[i])).map_or(1.0, |s| s.1);
-                for share in [0.05, 0.2, 0.8] {
-                    let symbol = format!("w{}", derived.len() + 1);
-                    with.push(vec![Factor::value(Signal::Input(inputs + derived.len()), first_lag)]);
-                    derived.push(Derived { symbol, source: i, law: Law::Dahl { length: share * std } });
+    let samples = gather(source)?;
+    check(source, &samples)?;
+    let (rates, mut decisions) = rates(&samples, options);
+    let mut found: Option<Winner<'_>> = None;
+    let mut refused = None;
+    for rate in rates {
+        let desk = Desk::new(source, options, &samples, rate)?;
+        match compete(desk, progress) {
+            Err(e) => refused = refused.or(Some(e)),
+            Ok(w) => {
+                decisions.push(format!("every {rate} sample(s): held-out free run {:.4e} by {}", w.stage.held.rmse, w.family.name));
+                let bar = found.as_ref().map_or(f64::INFINITY, |f| f.score * PREFER_OWN_RATE);
+                if w.score < bar || found.is_none() {
+                    found = Some(w);
                 }
             }
-            for i in 0..inputs {
-                with.extend(family::reversal_atoms(Signal::Input(i), first_lag));
-            }
-            with.extend(family::lag_atoms(inputs, nyn.min(2), first_lag..=nun.min(2)));
-            out.push(make(format!("presliding, lags {ny} and {nu}"), derived, fitted(with, 500)));
         }
-        out
     }
+    match (found, refused) {
+        (Some(winner), _) => finish(winner, decisions, progress),
+        (None, e) => Err(e.unwrap_or(IdentifyError::Nothing("stable model"))),
+    }
+}
+
+fn check(source: Source<'_>, samples: &[Samples]) -> Result<(), IdentifyError> {
+    let constant = |column: &str, values: Vec<&Vec<f64>>| {
+        let mut there = values.iter().flat_map(|v| v.iter()).filter(|v| v.is_finite());
+        let Some(&first) = there.next() else { return Err(IdentifyError::Empty(column.to_string())) };
+        if there.all(|v| *v == first) {
+            return Err(IdentifyError::Constant { column: column.to_string(), value: first });
+        }
+        Ok(())
+    };
+    constant(source.output, samples.iter().map(|s| &s.y).collect())?;
+    for (i, name) in source.inputs.iter().enumerate() {
+        constant(name, samples.iter().map(|s| &s.inputs[i]).collect())?;
+    }
+    Ok(())
+}
+
+/// The best model at one rate.
+struct Winner<'a> {
+    desk: Desk<'a>,
+    family: Family,
+    stage: Stage,
+    score: f64,
+    linear: Linear,
+    decisions: Vec<String>,
+    path: Vec<(usize, f64, f64)>,
+}
+
+/// A family under way.
+struct Runner {
+    family: Family,
+    stage: Stage,
+    score: f64,
+}
+
+impl Runner {
+    /// Samples that the model reaches back.
+    fn memory(&self) -> usize {
+        self.stage.fit.terms.iter().map(hysid_dictionary::Term::reach).max().unwrap_or(0)
+    }
+}
+
+fn compete<'a>(desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>, IdentifyError> {
+    let mut decisions = Vec::new();
+    let ladder = ladder(&desk, progress)?;
+    let Some(linear) = best(&ladder).cloned() else { return Err(IdentifyError::Nothing("stable linear model")) };
+    for l in &ladder {
+        decisions.push(format!("{}: held-out free run {:.4e}", l.family.name, l.stage.held.rmse));
+    }
+    progress("block structures");
+    let block = best_block(&desk, &ladder)?;
+    let mut starts: Vec<(Family, Option<Stage>)> = families(&desk, &ladder).into_iter().map(|f| (f, None)).collect();
+    starts.extend(block.map(|(f, s)| (f, Some(s))));
+    let mut runners: Vec<Runner> = starts
+        .into_par_iter()
+        .map(|(family, stage)| first_round(&desk, family, stage, progress))
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    runners.sort_by(|a, b| a.score.total_cmp(&b.score));
+    for r in &runners {
+        decisions.push(format!(
+            "{}: {} candidates, {} terms at first: held-out free run {:.4e}, score {:.4e}",
+            r.family.name,
+            r.family.candidates.len(),
+            r.stage.fit.terms.len(),
+            r.stage.held.rmse,
+            r.score
+        ));
+    }
+    runners.truncate(KEPT);
+    let grown = runners
+        .into_par_iter()
+        .map(|r| second_round(&desk, r, progress))
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .flatten();
+    let mut finalists = Vec::new();
+    for (r, path) in grown {
+        decisions.push(format!(
+            "{}: grown to {} terms: held-out free run {:.4e}, score {:.4e}",
+            r.family.name,
+            r.stage.fit.terms.len(),
+            r.stage.held.rmse,
+            r.score
+        ));
+        finalists.push((r, path));
+    }
+    // Of models that are about equally good the one with the shortest memory, then with the fewest terms, is the soundest.
+    let lowest = finalists.iter().map(|f| f.0.score).fold(f64::INFINITY, f64::min);
+    finalists.retain(|f| f.0.score <= (1.0 + EQUAL) * lowest);
+    let winner = finalists.into_iter().min_by_key(|f| (f.0.memory(), f.0.stage.fit.terms.len()));
+    let (runner, path) = winner.unwrap_or_else(|| {
+        let score = linear.stage.held.rmse;
+        (Runner { family: linear.family.clone(), stage: linear.stage.clone(), score }, Vec::new())
+    });
+    Ok(Winner { desk, family: runner.family, stage: runner.stage, score: runner.score, linear, decisions, path })
+}
+
+/// What refinement may move in this family while it grows.
+fn movable(family: &Family) -> Refine {
+    if family.derived.is_empty() { Refine::Coefficients } else { Refine::CoefficientsAndDerived }
+}
+
+fn first_round(
+    desk: &Desk<'_>,
+    family: Family,
+    stage: Option<Stage>,
+    progress: Progress<'_>,
+) -> Result<Option<Runner>, IdentifyError> {
+    progress(&family.name);
+    let mut trainer = desk.trainer(&family.derived, family.given())?;
+    let s = desk.split(&trainer, LOOKS[0])?;
+    let stage = match stage {
+        Some(stage) => Some(stage),
+        None => start(&mut trainer, &family, &s.search, &s.hold)?,
+    };
+    let Some(stage) = stage else { return Ok(None) };
+    let budget = Budget { terms: stage.fit.terms.len() + FIRST_TERMS, patience: FIRST_TERMS, steps: 4 };
+    let path = grow(&mut trainer, &family, stage, &s.search, &s.hold, budget, Refine::Coefficients)?;
+    let mut best: Option<(f64, Stage)> = None;
+    for stage in path {
+        let score = desk.score(&stage, family.given())?;
+        if best.as_ref().is_none_or(|b| score < b.0) {
+            best = Some((score, stage));
+        }
+    }
+    Ok(best.filter(|b| b.0.is_finite()).map(|(score, stage)| Runner { family, stage, score }))
+}
+
+type Grown = (Runner, Vec<(usize, f64, f64)>);
+
+fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Result<Option<Grown>, IdentifyError> {
+    let Runner { family, stage, .. } = runner;
+    progress(&format!("growing {}", family.name));
+    let mut trainer = desk.trainer(&family.derived, family.given())?;
+    let s = desk.split(&trainer, LOOKS[1])?;
+    let most = desk.options.terms.unwrap_or(MOST_TERMS.max(family.linear.len() + family.linear.len() / 2));
+    let budget = Budget { terms: most, patience: 6, steps: 6 };
+    let (fit, taught) = trainer.refine(stage.fit, &s.search, 10, movable(&family))?;
+    let held = trainer.error(&fit, &s.hold)?;
+    let first = Stage { fit, taught, held };
+    let stages = grow(&mut trainer, &family, first, &s.search, &s.hold, budget, movable(&family))?;
+    let path = stages.iter().map(|p| (p.fit.terms.len(), p.taught.rmse, p.held.rmse)).collect();
+    let mut scored = Vec::new();
+    for stage in stages {
+        scored.push((desk.score(&stage, family.given())?, stage));
+    }
+    let lowest = scored.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
+    let near = |s: &&(f64, Stage)| s.0 <= (1.0 + NEAR) * lowest;
+    let pick = scored.iter().filter(near).min_by_key(|s| s.1.fit.terms.len());
+    Ok(pick.map(|(score, stage)| (Runner { family, stage: stage.clone(), score: *score }, path)))
+}
+
+fn finish(winner: Winner<'_>, mut decisions: Vec<String>, progress: Progress<'_>) -> Result<Identified, IdentifyError> {
+    let Winner { desk, family, stage, linear, path, .. } = winner;
+    decisions.extend(winner.decisions);
+    progress("refining on all samples");
+    let (model, fit, note) = whole(&desk, &family, &stage, movable(&family))?;
+    decisions.push(note);
+    let (yardstick, _, _) = whole(&desk, &linear.family, &linear.stage, Refine::Coefficients)?;
+    let horizon = horizon(&desk, &family, &stage)?;
+    let warnings = warnings(&desk, &family, &stage, &fit, &linear, horizon)?;
+    let held_rmse = stage.held.rmse;
+    Ok(Identified { model, linear: yardstick, decisions, warnings, held_rmse, horizon, path })
+}
+
+/// The stage's model refined on all samples, unless that makes it less sound.
+fn whole(desk: &Desk<'_>, family: &Family, stage: &Stage, what: Refine) -> Result<(NarxModel, Fit, String), IdentifyError> {
+    let mut trainer = desk.trainer(&stage.fit.derived, family.given())?;
+    let mut windows = trainer.whole_windows();
+    if !stage.fit.derived.is_empty() {
+        // What a derived input remembered before the recording began is not known.
+        for w in &mut windows {
+            w.range.start += SETTLE.0.min((SETTLE.1 * w.range.len() as f64) as usize);
+        }
+    }
+    let (fit, error) = trainer.refine(stage.fit.clone(), &windows, FINAL_STEPS, what)?;
+    let before = desk.failed_trials(&stage.fit, family.given())?;
+    let after = desk.failed_trials(&fit, family.given())?;
+    let sound = error.rmse.is_finite() && after <= before;
+    let (fit, note) = if sound {
+        (fit, format!("refined on all samples: free run {:.4e}", error.rmse))
+    } else {
+        (stage.fit.clone(), "refining on all samples made the model less sound; the one of the search is kept".to_string())
+    };
+    let errors = trainer.standard_errors(&fit, &windows)?;
+    let reduction = trainer.error_reduction(&fit.terms, &windows)?;
+    let coefficients = fit
+        .terms
+        .iter()
+        .zip(&fit.theta)
+        .zip(errors.into_iter().zip(reduction))
+        .map(|((t, &theta), (standard_error, err))| Coefficient { term: t.clone(), theta, standard_error, err })
+        .collect();
+    let model = NarxModel::new(Parts {
+        signals: trainer.signals().clone(),
+        derived: fit.derived.clone(),
+        coefficients,
+        noise: vec![],
+        limit: desk.limit(),
+        period_s: desk.source.recordings.first().map(|r| r.clock().period_s),
+        decimation: desk.decimation,
+    })?;
+    Ok((model, fit, note))
 }

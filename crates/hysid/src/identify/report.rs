@@ -1,7 +1,7 @@
 //! What is told of an identification: `fit.json`, and the series that a page draws.
 
 use hysid_dictionary::Record;
-use hysid_narx::{NarxError, NarxModel};
+use hysid_narx::NarxModel;
 use hysid_signal::Recording;
 use hysid_validate::{Normaliser, measure};
 use serde::Serialize;
@@ -281,11 +281,5 @@ impl<'a> Columns<'a> {
     /// The same as the model takes it.
     pub fn record(&self) -> Record<'a> {
         Record::new(self.y, self.inputs.clone())
-    }
-}
-
-impl From<hysid_dictionary::DictionaryError> for IdentifyError {
-    fn from(error: hysid_dictionary::DictionaryError) -> Self {
-        Self::Narx(NarxError::from(error))
     }
 }
