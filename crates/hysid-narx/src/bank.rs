@@ -114,6 +114,22 @@ impl Bank {
     }
 }
 
+/// The mean of each sample and the `l - 1` before it: what a model that moves in steps of `l` samples sees of an input.
+///
+/// A short pulse between two steps keeps its area that way. At the beginning the mean is over the samples that there are; it is
+/// `NaN` where one of them is missing.
+pub fn mean_over_step(u: &[f64], l: usize) -> Vec<f64> {
+    if l <= 1 {
+        return u.to_vec();
+    }
+    (0..u.len())
+        .map(|n| {
+            let part = &u[(n + 1).saturating_sub(l)..=n];
+            part.iter().sum::<f64>() / part.len() as f64
+        })
+        .collect()
+}
+
 fn signs(x: &[f64], stretches: &[Range<usize>], threshold: f64) -> Vec<f64> {
     let mut out = vec![hysid_dictionary::FIRST_SIGN; x.len()];
     for s in stretches {

@@ -18,7 +18,7 @@ mod refine;
 mod run;
 mod trainer;
 
-pub use bank::Bank;
+pub use bank::{Bank, mean_over_step};
 pub use derived::{Derived, Law};
 pub use error::NarxError;
 pub use file::{LoadError, MODEL_FORMAT, MODEL_VERSION};

@@ -46,7 +46,7 @@ pub struct Parts {
     pub limit: f64,
     /// Sampling period of the recordings it was made from, in seconds, where it is known.
     pub period_s: Option<f64>,
-    /// The model moves in steps of so many samples of the recording.
+    /// The model moves in steps of so many samples of the recording, and its inputs are means over these steps.
     pub decimation: usize,
 }
 
@@ -172,7 +172,8 @@ impl NarxModel {
 
     /// Runs `predict` on each of the interleaved recordings that the model's rate leaves, and puts the results together.
     ///
-    /// A model that moves in steps of L samples predicts all samples that way, without interpolation.
+    /// A model that moves in steps of L samples predicts all samples that way, without interpolation. Its inputs are means over
+    /// these steps.
     fn by_phase(
         &self,
         record: &Record<'_>,
@@ -182,10 +183,11 @@ impl NarxModel {
         if l == 1 {
             return predict(record);
         }
+        let means: Vec<Vec<f64>> = record.inputs.iter().map(|u| crate::mean_over_step(u, l)).collect();
         let mut whole = Prediction { y: vec![f64::NAN; record.y.len()], diverged_at: None };
         for phase in 0..l.min(record.y.len()) {
             let take = |x: &[f64]| x.iter().copied().skip(phase).step_by(l).collect::<Vec<f64>>();
-            let (y, inputs) = (take(record.y), record.inputs.iter().map(|u| take(u)).collect::<Vec<_>>());
+            let (y, inputs) = (take(record.y), means.iter().map(|u| take(u)).collect::<Vec<_>>());
             let part = predict(&Record::new(&y, inputs.iter().map(Vec::as_slice).collect()))?;
             for (n, v) in part.y.into_iter().enumerate() {
                 whole.y[phase + n * l] = v;

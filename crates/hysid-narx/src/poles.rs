@@ -16,7 +16,8 @@ pub fn pole_factors(a: &[f64]) -> Vec<Vec<f64>> {
         _ => 0.0,
     });
     let mut poles: Vec<(f64, f64)> = companion.complex_eigenvalues().iter().map(|p| (p.re, p.im)).collect();
-    poles.sort_by(|x, y| (y.0.hypot(y.1), y.1).partial_cmp(&(x.0.hypot(x.1), x.1)).unwrap_or(std::cmp::Ordering::Equal));
+    poles
+        .sort_by(|x, y| (y.0.hypot(y.1), y.1).partial_cmp(&(x.0.hypot(x.1), x.1)).unwrap_or(std::cmp::Ordering::Equal));
     let scale = poles.first().map_or(1.0, |p| p.0.hypot(p.1)).max(1e-12);
     poles
         .iter()
@@ -55,7 +56,11 @@ mod tests {
 
     #[test]
     fn factors_multiply_back() {
-        for factors in [vec![vec![-0.5]], vec![vec![-1.6, 0.9], vec![-0.3]], vec![vec![-1.2, 0.7], vec![0.4], vec![-0.9], vec![-0.1, 0.2]]] {
+        for factors in [
+            vec![vec![-0.5]],
+            vec![vec![-1.6, 0.9], vec![-0.3]],
+            vec![vec![-1.2, 0.7], vec![0.4], vec![-0.9], vec![-0.1, 0.2]],
+        ] {
             let a = multiply_factors(&factors);
             let found = pole_factors(&a);
             assert_eq!(found.len(), factors.len());

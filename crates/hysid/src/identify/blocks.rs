@@ -10,13 +10,13 @@ use hysid_dictionary::{Factor, Signal, Term};
 use hysid_narx::{Derived, Law, Refine, multiply_factors, pole_factors};
 use rayon::prelude::*;
 
+use super::IdentifyError;
 use super::data::spread;
 use super::desk::Desk;
 use super::family::{Atom, Family, lag_atoms, products};
 use super::growth::{Stage, start_from};
 use super::linear::Linear;
 use super::options::Factors;
-use super::IdentifyError;
 
 /// Samples of the first and the second look at the starts.
 const LOOKS: [usize; 2] = [1500, 4000];
@@ -46,7 +46,11 @@ pub(crate) fn best_block(desk: &Desk<'_>, ladder: &[Linear]) -> Result<Option<(F
 }
 
 /// All starts refined, best first.
-fn look(desk: &Desk<'_>, starts: Vec<(Family, Option<Stage>)>, round: usize) -> Result<Vec<(Family, Stage)>, IdentifyError> {
+fn look(
+    desk: &Desk<'_>,
+    starts: Vec<(Family, Option<Stage>)>,
+    round: usize,
+) -> Result<Vec<(Family, Stage)>, IdentifyError> {
     let done: Vec<Option<(Family, Stage)>> = starts
         .into_par_iter()
         .map(|(family, before)| {
@@ -77,7 +81,8 @@ fn starts(desk: &Desk<'_>, linear: &Linear) -> Vec<Family> {
     let first = desk.options.input_delay.unwrap_or(0);
     let mut out = Vec::new();
     for choice in 0..1usize << factors.len() {
-        let share = |side: usize| factors.iter().enumerate().filter(move |(i, _)| choice >> i & 1 == side).map(|(_, f)| f);
+        let share =
+            |side: usize| factors.iter().enumerate().filter(move |(i, _)| choice >> i & 1 == side).map(|(_, f)| f);
         let (before, after) = (multiply_factors(share(1)), multiply_factors(share(0)));
         let filter = Law::Filter { a: before.clone() };
         if filter.problem().is_some() {
@@ -110,10 +115,8 @@ fn family(desk: &Desk<'_>, filter: &Law, plain: bool, ny: usize, corner: f64, fi
     derived.push(Derived { symbol: "w".into(), source: at, law });
     let clipped = Signal::Input(at + 1);
     let last = ny.max(1) + first;
-    let lags: Vec<Atom> = [source, clipped]
-        .into_iter()
-        .flat_map(|s| (first..=last).map(move |l| vec![Factor::value(s, l)]))
-        .collect();
+    let lags: Vec<Atom> =
+        [source, clipped].into_iter().flat_map(|s| (first..=last).map(move |l| vec![Factor::value(s, l)])).collect();
     let mut linear = vec![Term::constant()];
     linear.extend(lag_atoms(0, ny, 0..=0).iter().chain(&lags).map(|a| Term::new(a.iter().copied())));
     let near: Vec<Atom> = lags.iter().filter(|a| a[0].lag <= first + 3).cloned().collect();

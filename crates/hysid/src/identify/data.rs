@@ -1,6 +1,7 @@
 //! Recordings as an identification sees them: the named columns, at the model's rate, and what they say of themselves.
 
 use hysid_dictionary::Record;
+use hysid_narx::mean_over_step;
 
 use super::{IdentifyError, Source};
 
@@ -16,10 +17,10 @@ impl Samples {
         Record::new(&self.y, self.inputs.iter().map(Vec::as_slice).collect())
     }
 
-    /// Every `l`-th sample.
+    /// Every `l`-th sample of the output, and of the inputs' means over as many samples.
     pub(crate) fn every(&self, l: usize) -> Self {
         let take = |x: &[f64]| x.iter().copied().step_by(l.max(1)).collect();
-        Self { y: take(&self.y), inputs: self.inputs.iter().map(|u| take(u)).collect() }
+        Self { y: take(&self.y), inputs: self.inputs.iter().map(|u| take(&mean_over_step(u, l))).collect() }
     }
 }
 

@@ -21,7 +21,7 @@ pub(crate) struct Desk<'a> {
     trials: Vec<Trial>,
 }
 
-/// What a sound model endures: a recording with its inputs held, enlarged or made smaller.
+/// What a sound model endures: a recording with its inputs held, enlarged, made smaller, or with pulses on them.
 struct Trial {
     samples: Samples,
     /// The run must stay this close to the middle of the output's range.
@@ -34,6 +34,8 @@ const SIGN_SIGMAS: f64 = 3.0;
 const HELD: usize = 300;
 /// Samples of an enlarged or diminished stretch.
 const STRETCH: usize = 1200;
+/// Size of pulses on the inputs, in standard deviations.
+const PULSE: f64 = 0.7;
 /// A share of failed trials counts as this multiple of itself in the error.
 const PENALTY: f64 = 2.0;
 
@@ -95,25 +97,36 @@ impl<'a> Desk<'a> {
         Ok(split(&windows, trainer.given(), most))
     }
 
+    /// Drops the trials that this fit does not endure: where even a linear model leaves the range (an integrator under a held
+    /// input), leaving it is physics and not a fault.
+    pub(crate) fn calibrate_trials(&mut self, fit: &Fit, given: usize) -> Result<(), IdentifyError> {
+        let endured = self.endured(fit, given)?;
+        let mut keep = endured.iter();
+        self.trials.retain(|_| keep.next().copied().unwrap_or(true));
+        Ok(())
+    }
+
     /// The share of the trials that the fit does not endure.
     pub(crate) fn failed_trials(&self, fit: &Fit, given: usize) -> Result<f64, IdentifyError> {
-        if self.trials.is_empty() {
-            return Ok(0.0);
-        }
+        let endured = self.endured(fit, given)?;
+        let failed = endured.iter().filter(|e| !**e).count();
+        Ok(failed as f64 / endured.len().max(1) as f64)
+    }
+
+    /// For each trial, whether the fit endures it.
+    fn endured(&self, fit: &Fit, given: usize) -> Result<Vec<bool>, IdentifyError> {
         let records: Vec<_> = self.trials.iter().map(|t| t.samples.record()).collect();
         let mut trainer =
             Trainer::new(self.with_derived(&fit.derived)?, fit.derived.clone(), &records, given, self.limit() * 2.0)?;
         let middle = 0.5 * (self.y.low + self.y.high);
-        let mut failed = 0;
+        let mut endured = Vec::with_capacity(self.trials.len());
         for (record, trial) in self.trials.iter().enumerate() {
             let range = 0..trial.samples.y.len();
-            if range.len() <= given {
-                continue;
-            }
-            let peak = trainer.peaks(fit, &[Window { record, range }], middle)?;
-            failed += usize::from(!peak.iter().all(|p| *p <= trial.bound));
+            let short = range.len() <= given;
+            let peak = if short { Vec::new() } else { trainer.peaks(fit, &[Window { record, range }], middle)? };
+            endured.push(peak.iter().all(|p| *p <= trial.bound));
         }
-        Ok(failed as f64 / self.trials.len() as f64)
+        Ok(endured)
     }
 
     /// The held-out error, raised by the share of failed trials: what models are compared by.
@@ -125,7 +138,7 @@ impl<'a> Desk<'a> {
     }
 }
 
-/// The trials: at some places of the recordings, inputs held, diminished and enlarged about their mean.
+/// The trials: at some places of the recordings, inputs held, diminished and enlarged about their mean, with pulses.
 fn trials(samples: &[Samples], y: Spread) -> Vec<Trial> {
     let half = 0.5 * (y.high - y.low);
     let middle = 0.5 * (y.low + y.high);
@@ -161,6 +174,20 @@ fn trials(samples: &[Samples], y: Spread) -> Vec<Trial> {
             }
             scaled.y.iter_mut().for_each(|v| *v = middle + scale * (*v - middle));
             out.push(Trial { samples: scaled, bound: 2.0 * f64::max(scale, 1.0) * half });
+        }
+        for (place, period) in [(0.2, 30), (0.6, 120)] {
+            let mut pulsed = cut((place * n as f64) as usize, STRETCH);
+            if !pulsed.y.iter().chain(pulsed.inputs.iter().flatten()).all(|v| v.is_finite()) {
+                continue;
+            }
+            for u in &mut pulsed.inputs {
+                let size = PULSE * spread(u.iter()).map_or(0.0, |s| s.std);
+                for (n, v) in u.iter_mut().enumerate() {
+                    // Up, nothing, down, nothing: the mean stays.
+                    *v += size * [1.0, 0.0, -1.0, 0.0][n / period % 4];
+                }
+            }
+            out.push(Trial { samples: pulsed, bound: 2.0 * half });
         }
     }
     out

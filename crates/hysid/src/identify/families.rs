@@ -53,14 +53,25 @@ fn of_lags(desk: &Desk<'_>, ny: usize, nu: usize) -> Vec<Family> {
     if options.factors != Factors::Hysteresis {
         out.push(make("products of lags", vec![], interleaved(ny, nu, first, &atoms)));
     }
-    if options.factors == Factors::Polynomial || ny > REVERSAL_LAGS && options.factors == Factors::Auto {
+    if options.factors == Factors::Polynomial {
         return out;
     }
+    // Beside a long linear part only the presliding operators are tried.
+    let long = ny > REVERSAL_LAGS && options.factors == Factors::Auto;
     let of_inputs: Vec<Atom> = (0..inputs).flat_map(|i| reversal_atoms(Signal::Input(i), first)).collect();
-    out.push(make("input reversals", vec![], [of_inputs.clone(), interleaved(ny, nu, first, &atoms)].concat()));
-    if ny > 0 {
+    if !long {
+        out.push(make("input reversals", vec![], [of_inputs.clone(), interleaved(ny, nu, first, &atoms)].concat()));
+    }
+    if ny > 0 && !long {
         let of_output: Vec<Atom> = (1..=2).flat_map(|l| reversal_atoms(Signal::Output, l)).collect();
         out.push(make("output reversals", vec![], [of_output, interleaved(ny, nu, first, &atoms)].concat()));
+    }
+    if ny > 1 && !long {
+        // Friction depends on the velocity and not on where the machine stands: no level of the output in the products.
+        let mut of_velocity: Vec<Atom> = (1..=2).map(|l| vec![Factor::difference(Signal::Output, l)]).collect();
+        of_velocity.extend(reversal_atoms(Signal::Output, 1));
+        of_velocity.extend(lag_atoms(inputs, 0, first..=nu.min(2)));
+        out.push(make("velocity of the output", vec![], of_velocity));
     }
     let mut derived = Vec::new();
     let mut with: Vec<Atom> = Vec::new();
@@ -72,7 +83,11 @@ fn of_lags(desk: &Desk<'_>, ny: usize, nu: usize) -> Vec<Family> {
         }
     }
     if !derived.is_empty() {
-        out.push(make("presliding", derived, [with, of_inputs, interleaved(ny.min(2), nu.min(2), first, &atoms)].concat()));
+        out.push(make(
+            "presliding",
+            derived,
+            [with, of_inputs, interleaved(ny.min(2), nu.min(2), first, &atoms)].concat(),
+        ));
     }
     out
 }

@@ -1,9 +1,9 @@
 //! Linear models of growing lags, refined on their free run: they tell the lags and are the yardstick.
 
+use super::IdentifyError;
 use super::desk::Desk;
 use super::family::{Family, linear};
 use super::growth::{Stage, start};
-use super::IdentifyError;
 
 /// A linear model with its lags.
 #[derive(Debug, Clone)]

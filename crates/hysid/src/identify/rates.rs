@@ -8,7 +8,7 @@ pub(crate) const PREFER_OWN_RATE: f64 = 0.7;
 /// Below this step from sample to sample, in standard deviations, a signal is densely sampled.
 const DENSE: f64 = 0.06;
 /// The steps that reduced rates aim at.
-const AIMS: [f64; 2] = [0.06, 0.2];
+const AIMS: [f64; 3] = [0.012, 0.06, 0.2];
 /// A reduced recording has at least so many samples.
 const FEWEST: usize = 400;
 
@@ -23,12 +23,18 @@ pub(crate) fn rates(samples: &[Samples], options: &Options) -> (Vec<usize>, Vec<
     let step = |l: usize| samples.iter().map(|s| step_size(&s.y, l)).fold(0.0, f64::max);
     let own = step(1);
     if own >= DENSE || samples.iter().all(|s| spread(s.y.iter()).is_none()) {
-        return (vec![1], vec![format!("the recording's own rate: from sample to sample the output moves by {own:.2} of its standard deviation")]);
+        return (
+            vec![1],
+            vec![format!(
+                "the recording's own rate: from sample to sample the output moves by {own:.2} of its standard deviation"
+            )],
+        );
     }
     let mut found = vec![1];
-    for aim in AIMS {
-        let l = [2, 3, 5, 8, 10, 15, 20, 30, 50, 80, 100, 150, 200].into_iter().find(|&l| step(l) >= aim);
-        found.extend(l.filter(|&l| total / l >= FEWEST));
+    let allowed = [2, 3, 5, 8, 10, 15, 20, 30, 50, 80, 100, 150, 200].into_iter().filter(|&l| total / l >= FEWEST);
+    for aim in AIMS.into_iter().filter(|aim| *aim > 2.0 * own) {
+        // The lowest rate allowed where even that does not reach the aim.
+        found.extend(allowed.clone().find(|&l| step(l) >= aim).or_else(|| allowed.clone().last()));
     }
     found.dedup();
     let why = format!(

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::blocks::best_block;
 use super::data::{Samples, gather};
 use super::desk::Desk;
-use super::family::Family;
 use super::families::families;
+use super::family::Family;
 use super::growth::{Budget, Stage, grow, start};
 use super::linear::{Linear, best, ladder};
 use super::options::Options;
@@ -87,7 +87,10 @@ pub fn identify(source: Source<'_>, options: &Options, progress: Progress<'_>) -
         match compete(desk, progress) {
             Err(e) => refused = refused.or(Some(e)),
             Ok(w) => {
-                decisions.push(format!("every {rate} sample(s): held-out free run {:.4e} by {}", w.stage.held.rmse, w.family.name));
+                decisions.push(format!(
+                    "every {rate} sample(s): held-out free run {:.4e} by {}",
+                    w.stage.held.rmse, w.family.name
+                ));
                 let bar = found.as_ref().map_or(f64::INFINITY, |f| f.score * PREFER_OWN_RATE);
                 if w.score < bar || found.is_none() {
                     found = Some(w);
@@ -142,10 +145,11 @@ impl Runner {
     }
 }
 
-fn compete<'a>(desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>, IdentifyError> {
+fn compete<'a>(mut desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>, IdentifyError> {
     let mut decisions = Vec::new();
     let ladder = ladder(&desk, progress)?;
     let Some(linear) = best(&ladder).cloned() else { return Err(IdentifyError::Nothing("stable linear model")) };
+    desk.calibrate_trials(&linear.stage.fit, linear.family.given())?;
     for l in &ladder {
         decisions.push(format!("{}: held-out free run {:.4e}", l.family.name, l.stage.held.rmse));
     }
@@ -269,7 +273,12 @@ fn finish(winner: Winner<'_>, mut decisions: Vec<String>, progress: Progress<'_>
 }
 
 /// The stage's model refined on all samples, unless that makes it less sound.
-fn whole(desk: &Desk<'_>, family: &Family, stage: &Stage, what: Refine) -> Result<(NarxModel, Fit, String), IdentifyError> {
+fn whole(
+    desk: &Desk<'_>,
+    family: &Family,
+    stage: &Stage,
+    what: Refine,
+) -> Result<(NarxModel, Fit, String), IdentifyError> {
     let mut trainer = desk.trainer(&stage.fit.derived, family.given())?;
     let mut windows = trainer.whole_windows();
     if !stage.fit.derived.is_empty() {
@@ -285,7 +294,10 @@ fn whole(desk: &Desk<'_>, family: &Family, stage: &Stage, what: Refine) -> Resul
     let (fit, note) = if sound {
         (fit, format!("refined on all samples: free run {:.4e}", error.rmse))
     } else {
-        (stage.fit.clone(), "refining on all samples made the model less sound; the one of the search is kept".to_string())
+        (
+            stage.fit.clone(),
+            "refining on all samples made the model less sound; the one of the search is kept".to_string(),
+        )
     };
     let errors = trainer.standard_errors(&fit, &windows)?;
     let reduction = trainer.error_reduction(&fit.terms, &windows)?;

@@ -83,7 +83,9 @@ pub(crate) fn warnings(
     if let (Some(a), Some(b)) = (periods.first(), periods.last())
         && b / a > 1.01
     {
-        out.push(format!("the recordings have different sampling periods ({a} s to {b} s); the model takes them sample by sample"));
+        out.push(format!(
+            "the recordings have different sampling periods ({a} s to {b} s); the model takes them sample by sample"
+        ));
     }
     let gaps: usize = desk.samples.iter().map(|s| s.record().gap_free().len().saturating_sub(1)).sum();
     if gaps > 0 {
