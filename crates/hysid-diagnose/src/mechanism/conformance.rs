@@ -1,6 +1,7 @@
 //! What every mechanism must satisfy, as a suite that can be run on any simulation.
 
 mod motion;
+mod recovery;
 
 use std::collections::BTreeMap;
 

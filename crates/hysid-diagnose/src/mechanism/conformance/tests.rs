@@ -65,3 +65,24 @@ fn the_form_holds_on_the_simulations_of_the_recordings() {
     }
     assert!(seen > 0);
 }
+
+/// The cheap part of the recovery; `cargo xtask catalogue recover` runs it for every mechanism at every slot.
+#[test]
+fn a_mechanism_is_recovered_from_its_own_simulation() {
+    let benches = benches();
+    let check = |title: &str, id: &str| {
+        let bench = benches.iter().find(|b| b.title().starts_with(title)).unwrap();
+        let mechanism = crate::mechanism::mechanism(id).unwrap();
+        let (slot, signals) = bench.slots(mechanism).into_iter().next().unwrap();
+        let left = bench.recovery(mechanism, &slot, &signals).unwrap();
+        assert!(left < 0.02, "{id} at {slot} of {title}: {left} of the effect is left");
+    };
+    check("Oscillator", "coulomb_friction");
+    check("Oscillator", "cubic_stiffness");
+    check("Oscillator", "bouc_wen");
+    check("Piezo actuator", "prandtl_ishlinskii");
+    check("Piezo actuator", "quantisation");
+    check("Motor", "delay");
+    check("Tank", "abrupt_change");
+    check("Circuit", "input_saturation");
+}
