@@ -14,6 +14,7 @@ mod bootstrap;
 mod calibrate;
 mod compose;
 mod data;
+mod draw;
 mod error;
 mod hold;
 mod model;

@@ -9,6 +9,7 @@ use crate::base::Base;
 use crate::bootstrap::{ratio_of_rms, rms};
 use crate::compose::{Hypothesis, SearchOptions, Setting, add, best_of, compose, refit_all, short_list};
 use crate::data::{DataSet, held_out_blocks};
+use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, SurrogateTest, TestOptions, detectable_amplitude, surrogate_test};
 use crate::file::*;
@@ -221,7 +222,17 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.calibrated_parameters = calibrated(&best.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
     file.summary = summary(&file);
-    let picture = Picture { title: simulation.title.clone(), ..Picture::default() };
+    let noise: Vec<f64> = simulation.outputs.iter().map(|o| file.mismatch.noise_rms[&o.column]).collect();
+    let picture = picture(&Sitting {
+        simulation,
+        data: &data,
+        none: &pool[0],
+        best,
+        held: &held,
+        before: before.as_ref(),
+        after: after.as_ref(),
+        noise: &noise,
+    });
     Ok(Diagnosis { file, baseline, augmented, picture })
 }
 

@@ -7,31 +7,28 @@ use crate::evidence::Projector;
 use crate::locate::{Coordinate, region};
 use crate::screen::along;
 
+/// What the effects of `best` add, along the augmented trajectory: where to (`d(v)/dt`, or an output's column), and the difference of the
+/// first equation that changed.
+pub(crate) fn added_law(none: &Hypothesis<'_>, best: &Hypothesis<'_>) -> Option<(String, Expr)> {
+    let simulation = best.base.model.simulation();
+    let original = none.base.model.simulation();
+    let state = original.states.iter().find_map(|s| {
+        let now = simulation.state(&s.name)?;
+        (now.derivative != s.derivative)
+            .then(|| (format!("d({})/dt", s.name), now.derivative.clone() - s.derivative.clone()))
+    });
+    state.or_else(|| {
+        original.outputs.iter().find_map(|o| {
+            let now = simulation.output(&o.column)?;
+            (now.expression != o.expression).then(|| (o.column.clone(), now.expression.clone() - o.expression.clone()))
+        })
+    })
+}
+
 /// The region of the effects of `best`; `None` where they act everywhere alike, or there are none.
 pub fn words(none: &Hypothesis<'_>, best: &Hypothesis<'_>) -> Option<String> {
     let effect = best.effects.first()?;
-    let simulation = best.base.model.simulation();
-    let original = none.base.model.simulation();
-    // What the effects add: the difference of the equations that changed, along the augmented trajectory.
-    let mut differences: Vec<Expr> = original
-        .states
-        .iter()
-        .filter_map(|s| {
-            let now = simulation.state(&s.name)?;
-            (now.derivative != s.derivative).then(|| now.derivative.clone() - s.derivative.clone())
-        })
-        .collect();
-    if differences.is_empty() {
-        differences = original
-            .outputs
-            .iter()
-            .filter_map(|o| {
-                let now = simulation.output(&o.column)?;
-                (now.expression != o.expression).then(|| now.expression.clone() - o.expression.clone())
-            })
-            .collect();
-    }
-    let law = differences.into_iter().next()?;
+    let (_, law) = added_law(none, best)?;
     let names = ["x", "v", "u", "y", "w"];
     let quantities: Vec<(String, String, Expr)> = names
         .iter()
