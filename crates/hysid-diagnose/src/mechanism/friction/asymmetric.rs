@@ -1,5 +1,6 @@
 //! Dry friction of different size in the two directions.
 
+use super::is_there;
 use crate::mechanism::{Block, Family, Law, Mechanism, Need};
 use crate::slot::Place;
 
@@ -12,7 +13,7 @@ pub static ASYMMETRIC_FRICTION: Mechanism = Mechanism {
     applies: |slot| slot.has("v"),
     already: &["step(v)", "step(-v)", "abs(sign(v))", "sign(v)*sign(v)", "sign(v)^2"],
     law: |slot, _| {
-        if slot.shows("sign(v)") {
+        if is_there(slot) {
             // The symmetric part is there already: only what the directions differ by.
             return Law::force("F_a*abs(sign(v))").amplitude("F_a", "F", -1.0, 1.0);
         }

@@ -1,5 +1,6 @@
 //! Dry friction that is larger at small speed.
 
+use super::is_there;
 use crate::mechanism::{Block, Family, Law, Mechanism, Need, log_grid};
 use crate::slot::Place;
 
@@ -20,7 +21,7 @@ pub static STRIBECK_FRICTION: Mechanism = Mechanism {
     ],
     law: |slot, _| {
         let speed = log_grid(0.01, 0.6, 5);
-        if slot.shows("sign(v)") {
+        if is_there(slot) {
             return Law::force("F_d*exp(-(v/v_s)^2)*sign(v)")
                 .amplitude("F_d", "F", -0.5, 1.0)
                 .shape("v_s", "v", speed)
