@@ -1,4 +1,4 @@
-//! The numbers that equations are evaluated in: plain `f64`, `f64` with tangents, and several `f64` side by side.
+//! The numbers that equations are evaluated in: plain `f64` and `f64` with tangents.
 //!
 //! Derivatives are defined on purpose where a function has none: `abs`, `sign`, `step` and `floor` have derivative 0 at their
 //! kinks and jumps; `min` and `max` follow their first argument in a tie; a root or a power whose slope at 0 is infinite has
@@ -99,12 +99,14 @@ pub(crate) trait Number: Copy + Send + Sync + std::fmt::Debug + 'static {
     fn max(self, other: Self) -> Self;
     /// The number where the value of `test` is positive, else `other`.
     fn where_positive(self, test: Self, other: Self) -> Self;
-    /// The value; of several side by side the first.
+    /// The value.
     fn value(self) -> f64;
 }
 
 /// A number with one value, on which control flow can rest.
 pub(crate) trait Single: Number {
+    /// Whether vector instructions pay.
+    const WIDE: bool;
     fn tangent(self, k: usize) -> f64;
     /// `self` with `slope` added to tangent `k`.
     fn add_tangent(self, k: usize, slope: f64) -> Self;
@@ -174,6 +176,7 @@ impl Number for f64 {
 }
 
 impl Single for f64 {
+    const WIDE: bool = false;
     #[inline(always)]
     fn tangent(self, _: usize) -> f64 {
         0.0
@@ -185,24 +188,37 @@ impl Single for f64 {
 }
 
 /// A value and its derivatives in `T` directions.
+///
+/// Its operations are written as loops over the tangents: that is the form that the compiler vectorises.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub(crate) struct Dual<const T: usize> {
-    v: f64,
     d: [f64; T],
+    v: f64,
 }
 
+#[allow(clippy::needless_range_loop)] // zipped iterators of arrays are not vectorised as well
 impl<const T: usize> Dual<T> {
     #[inline(always)]
     fn chain(self, v: f64, slope: f64) -> Self {
-        Self { v, d: self.d.map(|d| slope * d) }
+        let mut d = [0.0; T];
+        for k in 0..T {
+            d[k] = slope * self.d[k];
+        }
+        Self { v, d }
     }
 
     #[inline(always)]
     fn chain2(self, other: Self, v: f64, slope: f64, other_slope: f64) -> Self {
-        Self { v, d: std::array::from_fn(|k| slope * self.d[k] + other_slope * other.d[k]) }
+        let mut d = [0.0; T];
+        for k in 0..T {
+            d[k] = slope * self.d[k] + other_slope * other.d[k];
+        }
+        Self { v, d }
     }
 }
 
+#[allow(clippy::needless_range_loop)] // as above
 impl<const T: usize> Number for Dual<T> {
     #[inline(always)]
     fn lift(v: f64) -> Self {
@@ -210,11 +226,19 @@ impl<const T: usize> Number for Dual<T> {
     }
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self { v: self.v + other.v, d: std::array::from_fn(|k| self.d[k] + other.d[k]) }
+        let mut d = [0.0; T];
+        for k in 0..T {
+            d[k] = self.d[k] + other.d[k];
+        }
+        Self { v: self.v + other.v, d }
     }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self { v: self.v - other.v, d: std::array::from_fn(|k| self.d[k] - other.d[k]) }
+        let mut d = [0.0; T];
+        for k in 0..T {
+            d[k] = self.d[k] - other.d[k];
+        }
+        Self { v: self.v - other.v, d }
     }
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -228,7 +252,7 @@ impl<const T: usize> Number for Dual<T> {
     }
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { v: -self.v, d: self.d.map(|d| -d) }
+        self.chain(-self.v, -1.0)
     }
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
@@ -277,6 +301,7 @@ impl<const T: usize> Number for Dual<T> {
 }
 
 impl<const T: usize> Single for Dual<T> {
+    const WIDE: bool = T > 1;
     #[inline(always)]
     fn tangent(self, k: usize) -> f64 {
         self.d.get(k).copied().unwrap_or(0.0)
@@ -287,64 +312,5 @@ impl<const T: usize> Single for Dual<T> {
             *d += slope;
         }
         self
-    }
-}
-
-/// `L` values side by side; each lane computes exactly what a lone `f64` does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(64))]
-pub(crate) struct Lanes<const L: usize>(pub [f64; L]);
-
-macro_rules! lanewise {
-    ($($name:ident($a:ident $(, $b:ident)?) $body:expr;)*) => {$(
-        #[inline(always)]
-        fn $name(self $(, $b: Self)?) -> Self {
-            Self(std::array::from_fn(|i| { let $a = self.0[i]; $(let $b = $b.0[i];)? $body }))
-        }
-    )*};
-}
-
-impl<const L: usize> Number for Lanes<L> {
-    #[inline(always)]
-    fn lift(x: f64) -> Self {
-        Self([x; L])
-    }
-    lanewise! {
-        add(a, b) a + b;
-        sub(a, b) a - b;
-        mul(a, b) a * b;
-        div(a, b) a / b;
-        neg(a) -a;
-        pow(a, b) a.powf(b);
-        atan2(a, b) a.atan2(b);
-        min(a, b) if b < a { b } else { a };
-        max(a, b) if b > a { b } else { a };
-    }
-    #[inline(always)]
-    fn scale(self, factor: f64) -> Self {
-        Self(self.0.map(|x| x * factor))
-    }
-    #[inline(always)]
-    fn call(self, function: Function) -> Self {
-        // The cheap ones are vectorised; the others go lane by lane.
-        match function {
-            Function::Abs => Self(self.0.map(f64::abs)),
-            Function::Sqrt => Self(self.0.map(f64::sqrt)),
-            Function::Sign => Self(self.0.map(sign)),
-            Function::Step => Self(self.0.map(|x| if x > 0.0 { 1.0 } else { 0.0 })),
-            _ => Self(self.0.map(|x| value(function, x))),
-        }
-    }
-    #[inline(always)]
-    fn powi(self, n: i32) -> Self {
-        Self(self.0.map(|x| powi(x, n)))
-    }
-    #[inline(always)]
-    fn where_positive(self, test: Self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| if test.0[i] > 0.0 { self.0[i] } else { other.0[i] }))
-    }
-    #[inline(always)]
-    fn value(self) -> f64 {
-        self.0.first().copied().unwrap_or(f64::NAN)
     }
 }

@@ -52,6 +52,14 @@ pub(super) struct Machine<'a, N> {
     trial: Vec<N>,
     point: Vec<N>,
     sticking: Vec<Vec<N>>,
+    beside_flow: Vec<N>,
+    /// Whether a surface is stuck, and whether the signs' registers are those of the modes.
+    any_stuck: bool,
+    sigma_set: bool,
+    /// Registers of inputs with level and slope after the present sample.
+    levels: Vec<(u32, f64, f64)>,
+    distances: Vec<f64>,
+    arch: pulp::Arch,
 }
 
 impl<'a, N: Single> Machine<'a, N> {
@@ -102,7 +110,14 @@ impl<'a, N: Single> Machine<'a, N> {
             trial: vec![zero; states],
             point: vec![zero; states],
             sticking: Vec::new(),
+            beside_flow: Vec::new(),
+            any_stuck: false,
+            sigma_set: false,
+            levels: Vec::new(),
+            distances: Vec::new(),
+            arch: pulp::Arch::new(),
         };
+        machine.go_to(0);
         let moment = machine.moment(zero, zero, zero, Phase::Start);
         model.prologue.run(&mut machine.registers, &mut machine.cells, &moment);
         let mut free = 0;
@@ -128,7 +143,29 @@ impl<'a, N: Single> Machine<'a, N> {
         machine
     }
 
+    /// Makes sample `n` the present one.
+    pub fn go_to(&mut self, n: usize) {
+        self.n = n;
+        self.tau = N::lift(0.0);
+        let drive = self.run.drive;
+        let model = self.model;
+        self.levels.clear();
+        for (leaves, series) in [(&model.input_leaves, &drive.inputs), (&model.rate_leaves, &drive.rates)] {
+            for &(register, i) in leaves {
+                let (level, slope) = self.between(|n| series.get(i).and_then(|s| s.get(n)).copied().unwrap_or(0.0));
+                self.levels.push((register, level, slope));
+            }
+        }
+    }
+
+    fn set_mode(&mut self, surface: usize, mode: Mode) {
+        self.modes[surface] = mode;
+        self.any_stuck = self.modes.contains(&Mode::Stuck);
+        self.sigma_set = false;
+    }
+
     /// `since` the last commit, on the way through a step.
+    #[inline(always)]
     fn moment(&self, tau: N, since: N, step: N, phase: Phase) -> Moment<N> {
         let elapsed = N::lift(self.run.drive.period_s * self.n as f64).add(tau);
         Moment { elapsed, since, step, phase }
@@ -156,14 +193,11 @@ impl<'a, N: Single> Machine<'a, N> {
     }
 
     /// Sets the registers of inputs and time, `tau` after sample `n`.
+    #[inline(always)]
     fn set_inputs(&mut self, tau: N) {
-        let drive = self.run.drive;
         let model = self.model;
-        for (leaves, series) in [(&model.input_leaves, &drive.inputs), (&model.rate_leaves, &drive.rates)] {
-            for &(register, i) in leaves {
-                let (level, slope) = self.between(|n| series.get(i).and_then(|s| s.get(n)).copied().unwrap_or(0.0));
-                self.registers[register as usize] = N::lift(level).add(tau.scale(slope));
-            }
+        for &(register, level, slope) in &self.levels {
+            self.registers[register as usize] = N::lift(level).add(tau.scale(slope));
         }
         if !self.added.is_empty() {
             for &(register, i) in &model.input_leaves {
@@ -172,16 +206,19 @@ impl<'a, N: Single> Machine<'a, N> {
             }
         }
         if let Some(register) = model.time_leaf {
+            let drive = self.run.drive;
             self.registers[register as usize] = N::lift(drive.start_s + drive.period_s * self.n as f64).add(tau);
         }
     }
 
+    #[inline(always)]
     fn set_states(&mut self, x: &[N]) {
         for &(register, i) in &self.model.state_leaves {
             self.registers[register as usize] = x[i];
         }
     }
 
+    #[inline(always)]
     fn set_sigma(&mut self) {
         for &(register, i) in &self.model.sigma_leaves {
             self.registers[register as usize] = self.sigma[i];
@@ -189,11 +226,11 @@ impl<'a, N: Single> Machine<'a, N> {
     }
 
     /// State derivatives with the signs as they are set.
+    #[inline(always)]
     fn flow(&mut self, x: &[N], moment: &Moment<N>, tau: N, out: &mut [N]) {
         let model = self.model;
         self.set_inputs(tau);
         self.set_states(x);
-        self.set_sigma();
         model.flow.run(&mut self.registers, &mut self.cells, moment);
         for (i, (to, &register)) in out.iter_mut().zip(&model.derivatives).enumerate() {
             let value = self.registers[register as usize];
@@ -220,7 +257,74 @@ impl<'a, N: Single> Machine<'a, N> {
     }
 
     /// State derivatives in the present modes: the signs of stuck surfaces are solved for and kept in `sigma`.
+    #[inline(always)]
     fn moded_flow(&mut self, x: &[N], moment: &Moment<N>, tau: N, out: &mut [N]) {
+        if self.any_stuck {
+            self.stuck_flow(x, moment, tau, out);
+        } else {
+            self.set_signs();
+            self.flow(x, moment, tau, out);
+        }
+    }
+
+    /// The signs of the modes, where none is stuck.
+    #[inline(always)]
+    fn set_signs(&mut self) {
+        if !self.sigma_set {
+            for (sigma, mode) in self.sigma.iter_mut().zip(&self.modes) {
+                *sigma = N::lift(mode.sign());
+            }
+            self.set_sigma();
+            self.sigma_set = true;
+        }
+    }
+
+    #[inline(never)]
+    fn stuck_flow(&mut self, x: &[N], moment: &Moment<N>, tau: N, out: &mut [N]) {
+        self.sigma_set = false;
+        let mut all = self.modes.iter().enumerate().filter(|(_, m)| **m == Mode::Stuck);
+        match (all.next(), all.next()) {
+            (Some((surface, _)), None) => self.stuck_flow_of_one(surface, x, moment, tau, out),
+            _ => self.stuck_flow_of_several(x, moment, tau, out),
+        }
+    }
+
+    /// As [`Self::stuck_flow_of_several`], for the common case.
+    fn stuck_flow_of_one(&mut self, surface: usize, x: &[N], moment: &Moment<N>, tau: N, out: &mut [N]) {
+        let one = N::lift(1.0);
+        for (sigma, mode) in self.sigma.iter_mut().zip(&self.modes) {
+            *sigma = N::lift(mode.sign());
+        }
+        self.sigma[surface] = one.neg();
+        self.set_sigma();
+        self.flow(x, moment, tau, out);
+        let model = self.model;
+        model.gradients.run(&mut self.registers, &mut self.cells, moment);
+        let below = self.rate(surface, out);
+        let mut above_flow = std::mem::take(&mut self.beside_flow);
+        above_flow.resize(out.len(), one);
+        self.sigma[surface] = one;
+        self.set_sigma();
+        self.flow(x, moment, tau, &mut above_flow);
+        let change = self.rate(surface, &above_flow).sub(below);
+        // 0 for a sign of -1 and 1 for a sign of 1.
+        let share = if change.value() != 0.0 {
+            below.neg().div(change)
+        } else if below.value() == 0.0 {
+            N::lift(0.5)
+        } else {
+            // No friction can hold it: the sign leaves its range on the side of the motion.
+            N::lift(10.0 * crate::number::sign(below.value()))
+        };
+        for (to, above) in out.iter_mut().zip(&above_flow) {
+            *to = to.add(above.sub(*to).mul(share));
+        }
+        self.beside_flow = above_flow;
+        self.sigma[surface] = share.scale(2.0).sub(one);
+        self.set_sigma();
+    }
+
+    fn stuck_flow_of_several(&mut self, x: &[N], moment: &Moment<N>, tau: N, out: &mut [N]) {
         let mut stuck = Vec::new();
         for (i, mode) in self.modes.iter().enumerate() {
             self.sigma[i] = N::lift(mode.sign());
@@ -229,10 +333,8 @@ impl<'a, N: Single> Machine<'a, N> {
                 self.sigma[i] = N::lift(-1.0);
             }
         }
+        self.set_sigma();
         self.flow(x, moment, tau, out);
-        if stuck.is_empty() {
-            return;
-        }
         let model = self.model;
         model.gradients.run(&mut self.registers, &mut self.cells, moment);
         let m = stuck.len();
@@ -242,6 +344,7 @@ impl<'a, N: Single> Machine<'a, N> {
         let mut right: Vec<N> = stuck.iter().map(|&i| self.rate(i, out).neg()).collect();
         for (j, &surface) in stuck.iter().enumerate() {
             self.sigma[surface] = N::lift(1.0);
+            self.set_sigma();
             let mut k = std::mem::take(&mut changes[j]);
             k.resize(out.len(), N::lift(0.0));
             self.flow(x, moment, tau, &mut k);
@@ -265,33 +368,45 @@ impl<'a, N: Single> Machine<'a, N> {
                 *to = to.add(change.mul(share));
             }
         }
+        self.set_sigma();
         self.sticking = changes;
     }
 
     /// One Runge-Kutta step of length `h` from `x`, into `trial`.
     fn step(&mut self, h: N) {
+        if N::WIDE {
+            let arch = self.arch;
+            arch.dispatch(
+                #[inline(always)]
+                || self.step_body(h),
+            );
+        } else {
+            self.step_body(h);
+        }
+    }
+
+    #[inline(always)]
+    fn step_body(&mut self, h: N) {
         let mut stages = std::mem::take(&mut self.stages);
         let mut point = std::mem::take(&mut self.point);
         let x = std::mem::take(&mut self.x);
         let half = h.scale(0.5);
         let zero = N::lift(0.0);
         let tau = self.tau;
+        point.copy_from_slice(&x);
         for s in 0..4 {
-            let since = match s {
-                0 => zero,
-                3 => h,
-                _ => half,
+            let (since, phase) = match s {
+                0 => (zero, Phase::Start),
+                3 => (h, Phase::Inside),
+                _ => (half, Phase::Inside),
             };
-            let moment = self.moment(tau.add(since), since, h, if s == 0 { Phase::Start } else { Phase::Inside });
-            let (before, rest) = stages.split_at_mut(s);
-            let Some(k) = rest.first_mut() else { break };
-            match before.last() {
-                None => self.moded_flow(&x, &moment, tau, k),
-                Some(last) => {
-                    for ((p, x), k) in point.iter_mut().zip(&x).zip(last) {
-                        *p = x.add(since.mul(*k));
-                    }
-                    self.moded_flow(&point, &moment, tau.add(since), k);
+            let now = tau.add(since);
+            let moment = self.moment(now, since, h, phase);
+            self.moded_flow(&point, &moment, now, &mut stages[s]);
+            if s < 3 {
+                let next = if s == 2 { h } else { half };
+                for ((p, x), k) in point.iter_mut().zip(&x).zip(&stages[s]) {
+                    *p = x.add(next.mul(*k));
                 }
             }
         }
@@ -308,18 +423,18 @@ impl<'a, N: Single> Machine<'a, N> {
     }
 
     /// How far each surface is from its event at `x`, `since` into a step: positive before, negative after.
-    fn distances(&mut self, x: &[N], since: N, step: N, out: &mut Vec<f64>) {
+    fn measure_distances(&mut self, x: &[N], since: N, step: N, out: &mut Vec<f64>) {
         let model = self.model;
         let tau = self.tau.add(since);
         let moment = self.moment(tau, since, step, Phase::Inside);
-        if self.modes.contains(&Mode::Stuck) {
+        if self.any_stuck {
             let mut k = std::mem::take(&mut self.point);
-            self.moded_flow(x, &moment, tau, &mut k);
+            self.stuck_flow(x, &moment, tau, &mut k);
             self.point = k;
         } else {
+            self.set_signs();
             self.set_inputs(tau);
             self.set_states(x);
-            self.set_sigma();
         }
         model.switches.run(&mut self.registers, &mut self.cells, &moment);
         out.clear();
@@ -354,12 +469,12 @@ impl<'a, N: Single> Machine<'a, N> {
         let mut k = std::mem::take(&mut self.point);
         let kept = self.modes[surface];
         let rates = [Mode::Positive, Mode::Negative].map(|mode| {
-            self.modes[surface] = mode;
+            self.set_mode(surface, mode);
             self.moded_flow(&x, &moment, self.tau, &mut k);
             self.model.gradients.run(&mut self.registers, &mut self.cells, &moment);
             self.rate(surface, &k).value()
         });
-        self.modes[surface] = kept;
+        self.set_mode(surface, kept);
         self.point = k;
         self.x = x;
         (rates[0], rates[1])
@@ -368,7 +483,7 @@ impl<'a, N: Single> Machine<'a, N> {
     /// The mode on a surface that has just been reached.
     fn decide(&mut self, surface: usize) {
         let (above, below) = self.rates_beside(surface);
-        self.modes[surface] = if above <= 0.0 && below >= 0.0 {
+        let mode = if above <= 0.0 && below >= 0.0 {
             if let Some(i) = self.model.surfaces[surface].state {
                 self.x[i as usize] = N::lift(0.0);
             }
@@ -384,6 +499,7 @@ impl<'a, N: Single> Machine<'a, N> {
                 _ => Mode::Positive,
             }
         };
+        self.set_mode(surface, mode);
     }
 
     /// Sets the modes from the arguments' signs: at the start, and after a jump.
@@ -393,14 +509,15 @@ impl<'a, N: Single> Machine<'a, N> {
         let x = self.x.clone();
         let stuck: Vec<bool> = self.modes.iter().map(|m| *m == Mode::Stuck).collect();
         self.modes.iter_mut().for_each(|m| *m = Mode::Positive);
-        self.distances(&x, zero, zero, &mut distances);
+        (self.any_stuck, self.sigma_set) = (false, false);
+        self.measure_distances(&x, zero, zero, &mut distances);
         for (i, s) in distances.into_iter().enumerate() {
             // A stuck surface stays so while its argument is zero up to rounding.
             let tiny = self.model.surfaces[i].state.is_none() && stuck[i];
             if s == 0.0 || (tiny && s.abs() < 1e-12) {
                 self.decide(i);
             } else {
-                self.modes[i] = Mode::of(s);
+                self.set_mode(i, Mode::of(s));
             }
         }
     }
@@ -413,18 +530,17 @@ impl<'a, N: Single> Machine<'a, N> {
             return;
         }
         let (mut rest, zero) = (h, N::lift(0.0));
-        let mut distances = Vec::new();
-        for _ in 0..MAX_EVENTS {
-            if self.modes.contains(&Mode::Stuck) {
-                // A held input may have jumped: a sign beyond its range lets go at once.
+        let mut distances = std::mem::take(&mut self.distances);
+        for event in 0..MAX_EVENTS {
+            if self.any_stuck && (event > 0 || self.hold == Hold::Zero) {
+                // A held input may have jumped, or another surface's event the forces: a sign beyond its range lets go.
                 let x = self.x.clone();
-                self.distances(&x, zero, rest, &mut distances);
-                let sigma = &self.sigma;
-                let modes = self.modes.iter_mut().zip(sigma).zip(&distances);
+                self.measure_distances(&x, zero, rest, &mut distances);
                 let mut released = false;
-                for ((mode, sigma), distance) in modes {
-                    if *mode == Mode::Stuck && *distance < 0.0 {
-                        *mode = Mode::of(sigma.value());
+                for i in 0..self.modes.len() {
+                    if self.modes[i] == Mode::Stuck && distances[i] < 0.0 {
+                        let mode = Mode::of(self.sigma[i].value());
+                        self.set_mode(i, mode);
                         released = true;
                     }
                 }
@@ -433,10 +549,12 @@ impl<'a, N: Single> Machine<'a, N> {
                 }
             }
             self.step(rest);
-            let trial = self.trial.clone();
-            self.distances(&trial, rest, rest, &mut distances);
+            let trial = std::mem::take(&mut self.trial);
+            self.measure_distances(&trial, rest, rest, &mut distances);
+            self.trial = trial;
             if distances.iter().all(|d| *d >= 0.0 || d.is_nan()) {
                 self.accept(rest);
+                self.distances = distances;
                 return;
             }
             let at_end = distances.clone();
@@ -452,7 +570,7 @@ impl<'a, N: Single> Machine<'a, N> {
                 // The derivative of the crossing time, and one Newton correction of its value.
                 self.step(length);
                 let trial = self.trial.clone();
-                self.distances(&trial, length, length, &mut distances);
+                self.measure_distances(&trial, length, length, &mut distances);
                 let s = self.registers[self.model.surfaces[surface].argument as usize];
                 let mut k = std::mem::take(&mut self.point);
                 let moment = self.moment(self.tau.add(length), length, length, Phase::Inside);
@@ -470,7 +588,7 @@ impl<'a, N: Single> Machine<'a, N> {
             self.accept(length);
             rest = rest.sub(length);
             if self.modes[surface] == Mode::Stuck {
-                self.modes[surface] = Mode::of(sign);
+                self.set_mode(surface, Mode::of(sign));
             } else {
                 self.decide(surface);
             }
@@ -497,7 +615,7 @@ impl<'a, N: Single> Machine<'a, N> {
             } else {
                 machine.x.clone()
             };
-            machine.distances(&x, N::lift(h), N::lift(whole), &mut distances);
+            machine.measure_distances(&x, N::lift(h), N::lift(whole), &mut distances);
             let scaled = fired.iter().zip(&scale).map(|(&i, s)| (distances[i] / s, i));
             scaled.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NAN, 0))
         };
@@ -576,8 +694,7 @@ impl<'a, N: Single> Machine<'a, N> {
             || (self.hold == Hold::Zero && model.surfaces.iter().any(|s| !s.by_input.is_empty()));
         let mut y = vec![zero; outputs];
         for n in 0..len {
-            self.n = n;
-            self.tau = zero;
+            self.go_to(n);
             if !self.modes.is_empty() && (n == 0 || jumps) {
                 self.refresh();
             }
@@ -615,18 +732,15 @@ impl<'a, N: Single> Machine<'a, N> {
         let zero = N::lift(0.0);
         let moment = self.moment(zero, zero, zero, Phase::Start);
         let x = std::mem::take(&mut self.x);
-        if self.modes.contains(&Mode::Stuck) {
+        if self.any_stuck {
             let mut k = std::mem::take(&mut self.point);
-            self.moded_flow(&x, &moment, zero, &mut k);
+            self.stuck_flow(&x, &moment, zero, &mut k);
             self.point = k;
         } else {
-            for (sigma, mode) in self.sigma.iter_mut().zip(&self.modes) {
-                *sigma = N::lift(mode.sign());
-            }
+            self.set_signs();
             self.set_inputs(zero);
             self.set_states(&x);
         }
-        self.set_sigma();
         self.x = x;
         self.model.measure.run(&mut self.registers, &mut self.cells, &moment);
         for (j, (y, &register)) in y.iter_mut().zip(&self.model.outputs).enumerate() {

@@ -6,6 +6,7 @@ mod differentiate;
 mod graph;
 mod integrate;
 mod linearise;
+mod many;
 mod memory;
 mod program;
 mod run;

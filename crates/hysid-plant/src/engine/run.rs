@@ -290,16 +290,12 @@ impl Compiled {
         let mut tangents = Vec::with_capacity(directions.len());
         let mut rest = directions;
         while !rest.is_empty() {
-            let (chunk, next) = rest.split_at(match rest.len() {
-                n @ 0..=8 => n,
-                n => n.min(16),
-            });
+            let (chunk, next) = rest.split_at(rest.len().min(8));
             let (r, t) = match chunk.len() {
                 1 => self.machine::<Dual<1>>(run, chunk),
                 2 => self.machine::<Dual<2>>(run, chunk),
                 3..=4 => self.machine::<Dual<4>>(run, chunk),
-                5..=8 => self.machine::<Dual<8>>(run, chunk),
-                _ => self.machine::<Dual<16>>(run, chunk),
+                _ => self.machine::<Dual<8>>(run, chunk),
             };
             tangents.extend(t);
             response = Some(r);
