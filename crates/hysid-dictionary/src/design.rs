@@ -1,6 +1,5 @@
 //! The design matrix: a dictionary on recordings, one row for each sample with all its lags, never stored.
 
-use std::collections::HashMap;
 use std::ops::Range;
 
 use hysid_linalg::{Columns, Matrix, Start};
@@ -26,8 +25,10 @@ pub(crate) struct Stretch {
 #[derive(Debug, Clone)]
 pub struct Design<'d> {
     dictionary: &'d Dictionary,
-    /// For each record, each quantity that a term uses, sample by sample.
-    channels: Vec<HashMap<Quantity, Vec<f64>>>,
+    /// The quantities that terms use, sorted.
+    quantities: Vec<Quantity>,
+    /// For each record, each of the quantities, sample by sample.
+    channels: Vec<Vec<Vec<f64>>>,
     stretches: Vec<Stretch>,
     rows: usize,
     records: usize,
@@ -68,12 +69,20 @@ impl<'d> Design<'d> {
                     rows += len;
                 }
             }
-            channels.push(quantities.iter().map(|&q| (q, channel(dictionary, record, &whole, q))).collect());
+            channels.push(quantities.iter().map(|&q| channel(dictionary, record, &whole, q)).collect());
         }
         if rows == 0 {
             return Err(DictionaryError::TooShort { longest, lag: reach });
         }
-        Ok(Self { dictionary, channels, stretches, rows, records: records.len(), plan: Plan::new(dictionary.terms()) })
+        Ok(Self {
+            dictionary,
+            quantities,
+            channels,
+            stretches,
+            rows,
+            records: records.len(),
+            plan: Plan::new(dictionary.terms()),
+        })
     }
 
     /// The dictionary.
@@ -128,13 +137,14 @@ impl<'d> Design<'d> {
         out: &mut [f64],
         join: impl Fn(&mut f64, f64),
     ) {
+        let quantity = self.quantities.binary_search(&factor.quantity).unwrap_or(0);
         let mut at = self.stretches.partition_point(|s| s.row + s.len <= rows.start);
         let mut done = rows.start;
         while done < rows.end && at < self.stretches.len() {
             let s = &self.stretches[at];
             let end = rows.end.min(s.row + s.len);
             let from = s.first + (done - s.row) - factor.lag;
-            let source = &self.channels[s.record][&factor.quantity][from..from + (end - done)];
+            let source = &self.channels[s.record][quantity][from..from + (end - done)];
             for (o, &v) in out[done - rows.start..end - rows.start].iter_mut().zip(source) {
                 join(o, v);
             }

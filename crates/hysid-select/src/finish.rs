@@ -17,7 +17,7 @@ pub(crate) fn finish<C: Columns + ?Sized>(
     y: &[f64],
     options: &Options,
     moments: &mut Moments<'_, C>,
-    table: Table,
+    mut table: Table,
 ) -> Selection {
     let (samples, energy) = (phi.rows(), moments.target_energy);
     let goal = Goal::of(&options.criterion);
@@ -29,7 +29,10 @@ pub(crate) fn finish<C: Columns + ?Sized>(
     let mut reversed: Vec<CurvePoint> = Vec::new();
     while chain_end > 0 {
         let (order, shortest) = chain(&table, chain_end);
-        let fit = refit(phi, y, &order, energy, goal.clone());
+        let fit = match table.refit.take_if(|(columns, _)| *columns == order) {
+            Some((_, fit)) => fit,
+            None => refit(phi, y, &order, energy, goal.clone()),
+        };
         for k in (shortest..=chain_end).rev() {
             let search_sse = table.best[k - 1].sse.max(0.0);
             let mut facts = fit.facts(k, samples);

@@ -4,11 +4,12 @@
 
 use hysid_linalg::Columns;
 
+use crate::criterion::choose;
 use crate::forward::Factor;
 use crate::moments::Moments;
 use crate::options::longest;
 use crate::pursuit::Pursuit;
-use crate::refit::{Goal, refit};
+use crate::refit::{Goal, Refit, refit};
 use crate::rescore::{Choice, choose_next};
 use crate::{Criterion, Options, Rejected, RejectedReason, Search, StopReason};
 
@@ -26,6 +27,8 @@ pub(crate) struct Table {
     pub ran_out: Option<StopReason>,
     /// The first greedy step whose choice rounding could have changed.
     pub doubtful_from: Option<usize>,
+    /// The last refit of the greedy path.
+    pub refit: Option<(Vec<usize>, Refit)>,
 }
 
 /// One subset.
@@ -123,7 +126,7 @@ fn grow<C: Columns + ?Sized>(
     longest: usize,
     mut report: Option<&mut Table>,
 ) -> Factor {
-    let mut next_look = options.patience.max(4);
+    let mut next_look = (options.patience + 4).max(4);
     while factor.chosen.len() < longest {
         let step = factor.chosen.len();
         let ranked = factor.best(8, options.pivot_guard);
@@ -159,31 +162,19 @@ fn grow<C: Columns + ?Sized>(
                 break;
             }
         }
-        if factor.chosen.len() == next_look && past_minimum(phi, y, moments, options, &factor) {
-            break;
-        }
-        if factor.chosen.len() == next_look {
-            next_look += 4;
+        if factor.chosen.len() == next_look && options.criterion.has_minimum() {
+            // A look costs a refit of the whole path: the further it has come, the rarer.
+            next_look += (next_look / 2).max(4);
+            let path = refit(phi, y, &factor.chosen, moments.target_energy, Goal::of(&options.criterion));
+            let values = path.values(&options.criterion, phi.rows());
+            let best = choose(&options.criterion, &values, &path.sse);
+            table.refit = Some((factor.chosen.clone(), path));
+            if best + options.patience <= factor.chosen.len() {
+                break;
+            }
         }
     }
     factor
-}
-
-/// Whether the criterion's smallest value along the path lies `patience` terms or more behind.
-fn past_minimum<C: Columns + ?Sized>(
-    phi: &C,
-    y: &[f64],
-    moments: &Moments<'_, C>,
-    options: &Options,
-    factor: &Factor,
-) -> bool {
-    if !options.criterion.has_minimum() {
-        return false;
-    }
-    let path = refit(phi, y, &factor.chosen, moments.target_energy, Goal::of(&options.criterion));
-    let values = path.values(&options.criterion, phi.rows());
-    let best = crate::criterion::choose(&options.criterion, &values, &path.sse);
-    best + options.patience <= factor.chosen.len()
 }
 
 /// Writes down candidates that the guard shuts out from here on.
