@@ -97,7 +97,8 @@ pub fn recommend(rows: &[FactorRow], alpha: f64) -> Recommendation {
     let bound = 1.0 - alpha;
     let keeps = |r: &&FactorRow| r.mre.robust < bound && r.above_nyquist <= LARGEST_LOSS;
     let factors = |f: &dyn Fn(&&FactorRow) -> bool| rows.iter().filter(f).map(|r| r.factor).collect::<Vec<_>>();
-    let admissible_as_printed = factors(&|r| r.mrd.as_printed > bound && r.mre.as_printed < bound);
+    let admissible_as_printed =
+        factors(&|r| r.mrd.as_printed.is_finite() && r.mrd.as_printed > bound && r.mre.as_printed < bound);
     let admissible = factors(&|r| r.mrd.robust > bound && keeps(r));
     let percent = 100.0 * bound;
     let (factor, reason) = match (rows.first(), admissible.first()) {

@@ -270,3 +270,29 @@ fn resample(x: &[f64], ratio: f64) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_narx_model_beats_the_linear_one_over_frequencies() {
+        let mut sections = vec![surrogate().unwrap()];
+        let folder = crate::root().join("../shared/recordings/osu_s809_dynamic_stall");
+        if folder.is_dir() {
+            sections.push(aerofoil(&folder).unwrap());
+        } else {
+            assert!(std::env::var("HYSID_REQUIRE_RECORDINGS").is_err(), "the recordings are needed but not there");
+            println!("skipped: no recordings");
+        }
+        for s in sections {
+            assert!(s.notes.iter().any(|n| n.ends_with(": better.")), "{}: {:?}", s.title, s.notes);
+        }
+    }
+
+    #[test]
+    fn resampling_is_exact_on_a_line() {
+        let x: Vec<f64> = (0..10).map(f64::from).collect();
+        assert_eq!(resample(&x, 2.5), [0.0, 2.5, 5.0, 7.5]);
+    }
+}

@@ -24,7 +24,7 @@ pub struct ChannelFacts {
     std: f64,
     /// The step of which all samples are multiples, up to a constant: the resolution of the sensor or of the file.
     resolution: Option<f64>,
-    /// Samples in plateaus of three or more at the smallest and at the largest value.
+    /// Samples in plateaus of four or more at the smallest and at the largest value.
     clipped: (usize, usize),
     /// The period with which the channel repeats, in seconds, and the correlation at that lag.
     period: Option<(f64, f64)>,
@@ -72,10 +72,10 @@ fn resolution(x: &[f64]) -> Option<f64> {
     (step.is_finite() && regular && gaps.len() + 1 < x.len() / 2).then_some(step)
 }
 
-/// Samples that lie at `level` in runs of at least three.
+/// Samples that lie at `level` in runs of at least four.
 fn plateau(x: &[f64], level: f64) -> usize {
     x.chunk_by(|a, b| (*a == level) == (*b == level))
-        .filter(|run| run[0] == level && run.len() >= 3)
+        .filter(|run| run[0] == level && run.len() >= 4)
         .map(<[f64]>::len)
         .sum()
 }
