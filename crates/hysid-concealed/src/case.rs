@@ -195,7 +195,10 @@ impl Case {
             // Past the top the motion is chaotic and no free run means anything.
             return None;
         }
-        let louder = record(&design, &machine, &fresh.louder(1.5), &val_noise, &tuned);
+        let mut louder = record(&design, &machine, &fresh.louder(1.5), &val_noise, &tuned);
+        for (column, s) in louder.iter_mut().flat_map(|l| &mut l.y).zip(&tuned.sigma) {
+            column.iter_mut().for_each(|v| *v += s * random.normal());
+        }
         for record in [&mut est, &mut val] {
             for (column, clean) in record.y.iter_mut().zip(&tuned.y) {
                 let full = clean.iter().fold(0.0_f64, |a, v| a.max(v.abs())) * headroom * 1.3;
@@ -353,6 +356,7 @@ fn concealed(design: &Design, e: &Effect) -> Concealed {
         Place::Output => output.clone(),
         Place::Disturbance => "disturbance".into(),
     }];
+    let rubs = matches!(kind, Kind::Drive | Kind::ClosedDrive);
     let linear = !matches!(kind, Kind::Drive | Kind::ClosedDrive | Kind::Pendulum | Kind::Wing);
     // Linear time-invariant blocks commute: before or after a linear plant is the same thing.
     let commutes = matches!(
@@ -362,7 +366,8 @@ fn concealed(design: &Design, e: &Effect) -> Concealed {
     if linear && commutes && !kind.prescribed() {
         slots.extend([input.clone(), output]);
     }
-    if matches!(e.law, Law::InputOffset | Law::BackEmf) || (linear && e.law == Law::OutputOffset) {
+    let forced = rubs && e.law == Law::AsymmetricFriction;
+    if forced || matches!(e.law, Law::InputOffset | Law::BackEmf) || (linear && e.law == Law::OutputOffset) {
         slots.extend([input, plant]);
     }
     let mut unique: Vec<String> = Vec::new();
@@ -372,6 +377,10 @@ fn concealed(design: &Design, e: &Effect) -> Concealed {
         }
     }
     let same = match e.law {
+        // On a plant that slides with F_c sgn v, friction that differs by 2 F_a between the directions is F_c sgn v and the constant force
+        // F_a, sticking included: the same machine as with an offset of the command.
+        Law::AsymmetricFriction if rubs => vec![("input_offset", "bias")],
+        Law::InputOffset if rubs => vec![("asymmetric_friction", "dry_friction")],
         // Dahl's law is Bouc and Wen's with gamma = 0 and n = 1.
         Law::Dahl => vec![("bouc_wen", "hysteretic_spring")],
         Law::SquareRootDamping => vec![("power_law_damping", "nonlinear_damping")],

@@ -65,7 +65,7 @@ impl Bench {
             Some(distance(&[e], &record.clean[..1], &case.label.sigma))
         };
         let val = error(&case.val, &case.val.y[0], "val.csv").unwrap_or(f64::INFINITY);
-        let louder = case.louder.as_ref().map(|l| error(l, &l.clean[0], "louder.csv").unwrap_or(f64::INFINITY));
+        let louder = case.louder.as_ref().map(|l| error(l, &l.y[0], "louder.csv").unwrap_or(f64::INFINITY));
         (val, louder)
     }
 }

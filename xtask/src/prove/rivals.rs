@@ -42,6 +42,8 @@ impl Rivals {
     }
 }
 
+/// Longest record that the NARX competitors are given, so that they do not take more time than the diagnosis.
+const LONGEST: usize = 4000;
 /// Samples that the search for the best rival law looks at.
 const LOOK: usize = 2000;
 
@@ -54,14 +56,15 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
     let linear = |record: &Record| {
         black.as_ref().map_or(f64::INFINITY, |b| distance(&b.run(&record.input), &record.clean, &case.label.sigma))
     };
+    let (short, unknown) = (case.label.samples <= LONGEST, (f64::NAN, None));
     Rivals {
         before: error(case, &calibrated, &case.val),
         oracle: error(case, &truth, &case.val),
         linear: linear(&case.val),
         linear_louder: case.louder.as_ref().map(linear),
         sindy: sindy::discrepancy(case, &calibrated).map(|m| error(case, &m, &case.val)),
-        narx: bench.narx(case),
-        narx_on_residual: bench.narx_on_residual(case, &calibrated),
+        narx: if short { bench.narx(case) } else { unknown },
+        narx_on_residual: if short { bench.narx_on_residual(case, &calibrated) } else { unknown },
         separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
     }
 }

@@ -101,7 +101,7 @@ impl Bench {
     pub fn error(&self, case: &Case, simulation: &Path, record: &Record, out: &Path) -> anyhow::Result<f64> {
         let input = out.join("input.csv");
         let prediction = out.join("prediction.csv");
-        std::fs::write(&input, case.csv(record, &record.clean))?;
+        std::fs::write(&input, case.csv(record, &record.y))?;
         let path = simulation.to_string_lossy();
         let from = input.to_string_lossy();
         self.call(out, &["simulate", &path, "--input", &from], &["--out"], &prediction).map_err(anyhow::Error::msg)?;
