@@ -7,6 +7,7 @@ use crate::base::Base;
 use crate::compose::Hypothesis;
 use crate::data::DataSet;
 use crate::hold::FreeRun;
+use crate::mechanism::Block;
 use crate::picture::{LawPicture, MapPicture, ParameterPicture, Picture, RecordPicture, Role, SpectrumPicture};
 use crate::screen::along;
 use crate::slot::Structure;
@@ -222,8 +223,13 @@ fn laws(s: &Sitting<'_, '_>) -> Vec<LawPicture> {
         let unit = effect.slot.quantity("F").and_then(|q| q.unit.as_ref()).map(ToString::to_string);
         y_label = unit.map_or("force against the motion".into(), |u| format!("force against the motion ({u})"));
     }
+    // A spring is looked at over the displacement first, everything else over the velocity.
+    let order = match effect.mechanism.block_at(&effect.slot) {
+        Block::Restoring | Block::Hysteresis => ["x", "v", "u", "y", "w"],
+        _ => ["v", "x", "u", "y", "w"],
+    };
     let mut out = Vec::new();
-    for name in ["v", "x", "u", "y", "w"] {
+    for name in order {
         let Some(q) = effect.slot.quantity(name) else { continue };
         let Some(series) = along(&s.best.base, &[q.expression.clone(), law.clone()]) else { continue };
         let points: Vec<(f64, f64)> = series[0].concat().into_iter().zip(series[1].concat()).collect();

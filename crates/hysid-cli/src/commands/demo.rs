@@ -1,4 +1,4 @@
-//! `hysid demo`: identifies a shipped recording with the very commands that a user types.
+//! `hysid demo`: identifies a shipped recording and diagnoses a shipped simulation, with the very commands that a user types.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use hysid_io::write_text;
 
 use crate::failure::Failure;
 
-/// Identify a shipped recording; prints the commands that it runs and names the reports.
+/// Identify a shipped recording and diagnose a shipped simulation; prints the commands and names the reports
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder for the recordings and the reports.
@@ -17,6 +17,12 @@ pub struct Args {
 
 /// A piezo actuator with hysteresis; `fixtures/README.md` has the command that made it.
 const PIEZO: &str = include_str!("../../../../fixtures/piezo_boucwen.csv");
+/// A simulation of an oscillator, and recordings of one whose spring is not what the simulation says; also in `fixtures/README.md`.
+const OSCILLATOR: [(&str, &str); 3] = [
+    ("oscillator.sim.toml", include_str!("../../../../fixtures/oscillator/baseline.sim.toml")),
+    ("oscillator_est.csv", include_str!("../../../../fixtures/oscillator/est.csv")),
+    ("oscillator_val.csv", include_str!("../../../../fixtures/oscillator/val.csv")),
+];
 /// Rows that the model is made from; the rest is the hold-out.
 const ESTIMATION_ROWS: usize = 4000;
 
@@ -34,31 +40,36 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Ok(path)
     };
     let (est, val) = (file("piezo_est.csv", &est)?, file("piezo_val.csv", &val)?);
-    let fit = out.join("fit");
+    let mut shipped = Vec::new();
+    for (name, text) in OSCILLATOR {
+        shipped.push(file(name, text)?);
+    }
+    let (fit, diagnosis) = (out.join("fit"), out.join("diagnosis"));
     println!("1. A piezo actuator with hysteresis: a model from its recording.\n");
-    hysid(&[
-        "fit".as_ref(),
-        "--recording".as_ref(),
-        est.as_path(),
-        "--input".as_ref(),
-        "u_V".as_ref(),
-        "--output".as_ref(),
-        "y_um".as_ref(),
-        "--holdout".as_ref(),
-        val.as_path(),
-        "--out".as_ref(),
-        fit.as_path(),
-    ])?;
-    println!("\nOpen {} in a browser.", fit.join("report.html").display());
+    let line = ["fit", "--recording", &text(&est), "--input", "u_V", "--output", "y_um", "--holdout", &text(&val)];
+    hysid(&line, &fit)?;
+    println!("\n2. An oscillator that does not move as its simulation says: what is missing?\n");
+    let line = ["diagnose", &text(&shipped[0]), "--recording", &text(&shipped[1]), "--holdout", &text(&shipped[2])];
+    hysid(&line, &diagnosis)?;
+    println!("\nOpen these in a browser:\n  {}", fit.join("report.html").display());
+    println!("  {}", diagnosis.join("report.html").display());
     Ok(())
 }
 
-/// Prints and runs one command line.
-fn hysid(arguments: &[&Path]) -> Result<(), Failure> {
-    let shown: Vec<String> = arguments.iter().map(|a| a.display().to_string()).collect();
-    println!("$ hysid {}\n", shown.join(" "));
-    let line = std::iter::once(OsString::from("hysid")).chain(arguments.iter().map(|a| a.as_os_str().to_owned()));
-    crate::run(line)
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// Prints and runs one command line that writes into `out`.
+fn hysid(arguments: &[&str], out: &Path) -> Result<(), Failure> {
+    let line: Vec<String> = std::iter::once("hysid")
+        .chain(arguments.iter().copied())
+        .chain(["--out"])
+        .map(String::from)
+        .chain([text(out)])
+        .collect();
+    println!("$ {}\n", line.join(" "));
+    crate::run(line.into_iter().map(OsString::from))
 }
 
 /// The first `rows` rows of a recording and the rest, each under the header line.
