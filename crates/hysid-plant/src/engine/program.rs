@@ -1,6 +1,7 @@
 //! Programs: the part of the graph that some roots need, in order of evaluation, over one file of registers.
 //!
-//! A node's register has the node's number. Leaves are set before a program runs.
+//! A node's register has the node's number. Leaves are set before a program runs. A sum whose parts nobody else uses
+//! (`u - c*v - k*x`) is one operation that keeps its partial sums out of the registers; the order of rounding stays.
 
 use super::graph::{Node, NodeId};
 use super::memory::{Cell, Moment};
@@ -26,12 +27,24 @@ enum Op {
     Relay(u32, u32, u32, u32),
     Lag(u32, u32, u32),
     Delay(u32, u32, u32),
+    /// The terms from a number on, so many of them.
+    Sum(u32, u32),
+}
+
+/// A term of a sum: a register or a product of two, added or subtracted.
+#[derive(Debug, Clone, Copy)]
+enum Term {
+    Plus(u32),
+    Minus(u32),
+    PlusProduct(u32, u32),
+    MinusProduct(u32, u32),
 }
 
 /// Operations in order, each with the register that it writes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Program {
     ops: Vec<(u32, Op)>,
+    terms: Vec<Term>,
 }
 
 fn op(node: Node) -> Option<Op> {
@@ -66,20 +79,81 @@ fn op(node: Node) -> Option<Op> {
 impl Program {
     /// What the roots need, except the nodes that `done` says are there already.
     pub fn new(nodes: &[Node], roots: impl IntoIterator<Item = NodeId>, done: impl Fn(NodeId) -> bool) -> Self {
+        let roots: Vec<NodeId> = roots.into_iter().collect();
         let mut needed = vec![false; nodes.len()];
-        let mut open: Vec<NodeId> = roots.into_iter().collect();
+        let mut uses = vec![0_u32; nodes.len()];
+        let mut open = roots.clone();
         while let Some(id) = open.pop() {
             let Some(flag) = needed.get_mut(id as usize) else { continue };
             if *flag || done(id) {
                 continue;
             }
             *flag = true;
-            if let Some(node) = nodes.get(id as usize) {
-                open.extend(node.operands().into_iter().flatten());
+            for operand in nodes.get(id as usize).into_iter().flat_map(|n| n.operands()).flatten() {
+                if let Some(count) = uses.get_mut(operand as usize) {
+                    *count += 1;
+                }
+                open.push(operand);
             }
         }
-        let chosen = nodes.iter().zip(needed).enumerate().filter(|(_, (_, needed))| *needed);
-        Self { ops: chosen.filter_map(|(id, (node, _))| Some((id as u32, op(*node)?))).collect() }
+        for root in roots {
+            if let Some(count) = uses.get_mut(root as usize) {
+                *count += 2;
+            }
+        }
+        let mut program = Self::default();
+        let mut absorbed = vec![false; nodes.len()];
+        // From the last node back, so that a sum is seen before its parts.
+        for (id, node) in nodes.iter().enumerate().rev() {
+            if !needed[id] || absorbed[id] {
+                continue;
+            }
+            let lone = |id: NodeId| needed[id as usize] && uses[id as usize] == 1;
+            let sum = program.sum(nodes, *node, lone, &mut absorbed);
+            program.ops.extend(sum.or_else(|| op(*node)).map(|op| (id as u32, op)));
+        }
+        program.ops.reverse();
+        program
+    }
+
+    /// A sum with the parts that are used only here drawn in; none where there is nothing to draw in.
+    fn sum(&mut self, nodes: &[Node], node: Node, lone: impl Fn(NodeId) -> bool, absorbed: &mut [bool]) -> Option<Op> {
+        let mut reversed = Vec::new();
+        let mut drawn = 0;
+        let mut term = |id: NodeId, plus: bool, absorbed: &mut [bool]| match nodes.get(id as usize) {
+            Some(Node::Mul(a, b)) if lone(id) => {
+                absorbed[id as usize] = true;
+                drawn += 1;
+                if plus { Term::PlusProduct(*a, *b) } else { Term::MinusProduct(*a, *b) }
+            }
+            _ if plus => Term::Plus(id),
+            _ => Term::Minus(id),
+        };
+        let (mut left, right, plus) = match node {
+            Node::Add(a, b) => (a, b, true),
+            Node::Sub(a, b) => (a, b, false),
+            _ => return None,
+        };
+        reversed.push(term(right, plus, absorbed));
+        let mut chained = 0;
+        while lone(left) {
+            let (next, right, plus) = match nodes.get(left as usize) {
+                Some(Node::Add(a, b)) => (*a, *b, true),
+                Some(Node::Sub(a, b)) => (*a, *b, false),
+                _ => break,
+            };
+            absorbed[left as usize] = true;
+            chained += 1;
+            reversed.push(term(right, plus, absorbed));
+            left = next;
+        }
+        reversed.push(term(left, true, absorbed));
+        if drawn + chained == 0 {
+            return None;
+        }
+        let from = self.terms.len() as u32;
+        self.terms.extend(reversed.into_iter().rev());
+        Some(Op::Sum(from, self.terms.len() as u32 - from))
     }
 
     /// Runs over the registers; `cells` are the operators' memories as of `moment`.
@@ -101,6 +175,22 @@ impl Program {
                 Op::Atan2(a, b) => r(a).atan2(r(b)),
                 Op::Min(a, b) => r(a).min(r(b)),
                 Op::Max(a, b) => r(a).max(r(b)),
+                Op::Sum(from, count) => {
+                    let (from, count) = (from as usize, count as usize);
+                    let mut sum = N::lift(0.0);
+                    for (i, term) in self.terms[from..from + count].iter().enumerate() {
+                        sum = match *term {
+                            // The first is taken as it is: adding it to 0 would lose the sign of a zero.
+                            Term::Plus(a) if i == 0 => r(a),
+                            Term::PlusProduct(a, b) if i == 0 => r(a).mul(r(b)),
+                            Term::Plus(a) => sum.add(r(a)),
+                            Term::Minus(a) => sum.sub(r(a)),
+                            Term::PlusProduct(a, b) => sum.add(r(a).mul(r(b))),
+                            Term::MinusProduct(a, b) => sum.sub(r(a).mul(r(b))),
+                        };
+                    }
+                    sum
+                }
                 Op::Play(w, half_width, cell) => cells[cell as usize].play(r(w), r(half_width)),
                 Op::Relay(w, lower, upper, cell) => cells[cell as usize].relay(r(w), r(lower), r(upper)),
                 Op::Lag(w, tau, cell) => cells[cell as usize].lag(r(w), r(tau), moment),
