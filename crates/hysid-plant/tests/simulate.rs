@@ -2,7 +2,7 @@
 
 mod common;
 
-use hysid_plant::{Compiled, Direction, Drive, Injection, Response, Run, Simulation, Slot, Start};
+use hysid_plant::{Compiled, Direction, Drive, Injection, Observer, Response, Run, Simulation, Slot, Start};
 
 fn compile(text: &str) -> Compiled {
     let simulation = Simulation::parse(text, "test.sim.toml").unwrap_or_else(|e| panic!("{e}"));
@@ -367,4 +367,62 @@ fn an_amplitude_at_zero_has_the_sensitivity_of_its_injection() {
     let norm: f64 = s.tangents[1][0].iter().map(|x| x * x).sum::<f64>().sqrt();
     let gap: f64 = s.tangents[0][0].iter().zip(&s.tangents[1][0]).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     assert!(gap < 0.05 * norm, "{gap} {norm}");
+}
+
+#[test]
+fn the_linear_model_is_that_of_the_equations() {
+    let states = [("x", "v", "0.0"), ("v", "(u - 3*v - k*sin(x))/m", "0.0")];
+    let compiled = model("linear", &[("m", 2.0), ("k", 50.0)], &states, &[("y", "3*x + 0.5*u")]);
+    let linear = compiled.linearise(&compiled.theta(), &[0.5, 0.0], &[1.0]);
+    assert_eq!(linear.a[..2], [0.0, 1.0]);
+    assert!((linear.a[2] + 25.0 * 0.5_f64.cos()).abs() < 1e-12 && (linear.a[3] + 1.5).abs() < 1e-12);
+    assert_eq!((linear.b, linear.c, linear.d), (vec![0.0, 0.5], vec![3.0, 0.0], vec![0.5]));
+}
+
+#[test]
+fn an_observer_leads_from_the_free_run_to_the_measurement() {
+    let states = [("x", "v", "0.0"), ("v", "u - c*v - k*x", "0.0")];
+    let truth = model("linear", &[("c", 0.5), ("k", 100.0)], &states, &[("y", "x")]);
+    let wrong = model("linear", &[("c", 0.5), ("k", 60.0)], &states, &[("y", "x")]);
+    let drive = drive(1000, wobble);
+    let measured = simulate(&truth, &drive, 4).outputs;
+    let data = hysid_plant::Data::new(&wrong, "m", drive.clone(), measured.clone()).expect("valid");
+    let theta = wrong.theta();
+    let mut errors = Vec::new();
+    for strength in [0.0, 0.01, 0.1, 1.0] {
+        let gain = wrong.observer_gain(&data, &theta, &[0.0, 0.0], strength);
+        let run = Run::new(&drive, &theta).observing(Observer { gain: &gain, measured: &measured });
+        let y = wrong.simulate(&run);
+        if strength == 0.0 {
+            assert_eq!(y, simulate(&wrong, &drive, 4));
+        }
+        let squares: f64 = y.outputs[0].iter().zip(&measured[0]).map(|(a, b)| (a - b).powi(2)).sum();
+        errors.push(squares.sqrt());
+    }
+    assert!(errors.windows(2).all(|w| w[1] < w[0]) && errors[3] < 0.1 * errors[0], "{errors:?}");
+}
+
+#[test]
+fn the_step_halving_check_asks_for_what_the_equations_need() {
+    let states = [("x", "v", "0.1"), ("v", "u - k*x", "0.0")];
+    let steps = |k: f64| {
+        let compiled = model("linear", &[("k", k)], &states, &[("y", "x")]);
+        let theta = compiled.theta();
+        compiled.check_steps(&drive(400, wobble), &theta, Start::Document(&[]), 1e-4)
+    };
+    let (slow, fast) = (steps(100.0), steps(40_000.0));
+    assert!(slow.substeps == 1 && slow.error < 1e-4, "{slow:?}");
+    assert!(fast.substeps > 4 && fast.error < 1e-4, "{fast:?}");
+}
+
+#[test]
+fn many_runs_are_what_each_is_alone() {
+    let states = [("x", "v", "0.1"), ("v", "20*u - k*x - 2*sign(v)", "0.0")];
+    let compiled = model("linear", &[("k", 100.0)], &states, &[("y", "x")]);
+    let drive = drive(200, wobble);
+    let thetas = [[80.0], [100.0], [150.0]];
+    let runs: Vec<Run<'_>> = thetas.iter().map(|theta| Run::new(&drive, theta)).collect();
+    for (run, response) in runs.iter().zip(compiled.simulate_many(&runs)) {
+        assert_eq!(compiled.simulate(run), response);
+    }
 }
