@@ -126,6 +126,15 @@ impl<'d> Design<'d> {
         }
     }
 
+    pub(crate) fn stretches(&self) -> &[Stretch] {
+        &self.stretches
+    }
+
+    /// A quantity that a term uses, all samples of a record.
+    pub(crate) fn samples_of(&self, record: usize, quantity: Quantity) -> &[f64] {
+        &self.channels[record][self.quantities.binary_search(&quantity).unwrap_or(0)]
+    }
+
     pub(crate) fn plan(&self) -> &Plan {
         &self.plan
     }

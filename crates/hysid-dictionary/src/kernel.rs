@@ -1,15 +1,18 @@
 //! All inner products of the dictionary with a few weights in one pass over the samples, columns made on the fly.
 //!
-//! A term is a head (all factors but the last two) times a tail (its last one or two factors). The distinct tails are multiplied
-//! out once a tile; a head is multiplied into each weight once; then every term costs one multiply-add for each weight
+//! A term is a head (all factors but the last two) times a tail (its last one or two factors). Tails that differ by a shift in
+//! time only are one series, multiplied out once a tile; a head is multiplied into each weight once; then every term costs one multiply-add for each weight
 //! and sample, as a matrix product of weighted heads with tails. Memory traffic is that of the signals. Heads whose tails end
 //! alike (all of a full polynomial dictionary) are taken together, so that the product has enough rows even for one weight.
 
-use hysid_linalg::Columns;
+use std::collections::BTreeMap;
+
 use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, multiply, pack, total};
+use hysid_linalg::{Columns, product};
 use rayon::prelude::*;
 
-use crate::{Design, Factor, Term};
+use crate::design::Stretch;
+use crate::{Design, Factor, Quantity, Term};
 
 /// Samples in a tile: the factors of a tile stay in the second-level cache, weights and prefix in the first.
 const TILE: usize = 256;
@@ -27,21 +30,41 @@ const SERIAL_BELOW: usize = 3_000_000;
 /// A head and the terms that it makes.
 #[derive(Debug, Clone)]
 struct Node {
-    /// The variables whose product it is.
+    /// Where in the tile the factors begin whose product it is.
     head: Vec<usize>,
-    /// First lane in the tile of each tail.
+    /// Where in the tile each tail begins.
     tails: Vec<u32>,
     /// The first of its terms, as a place in `order`; one place for each tail.
     first: usize,
 }
 
+/// One quantity over a tile and the lags before it.
+#[derive(Debug, Clone)]
+struct Series {
+    quantity: Quantity,
+    /// The largest lag: the series begins so many samples before the tile.
+    most: usize,
+    /// Where it begins in the tile's buffer.
+    at: usize,
+}
+
+/// The product of two series at a fixed difference of lags.
+#[derive(Debug, Clone)]
+struct Product {
+    /// Where the factors begin in the tile's buffer.
+    factors: (usize, usize),
+    /// Where it begins, and its length.
+    at: usize,
+    len: usize,
+}
+
 /// How a dictionary is evaluated.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
-    /// The distinct factors.
-    pub variables: Vec<Factor>,
-    /// The tails of two factors, as pairs of variables; in the tile they follow the variables.
-    pairs: Vec<(usize, usize)>,
+    series: Vec<Series>,
+    products: Vec<Product>,
+    /// Length of the tile's buffer.
+    len: usize,
     nodes: Vec<Node>,
     /// The dictionary's column of each place.
     order: Vec<usize>,
@@ -49,53 +72,71 @@ pub(crate) struct Plan {
     constant: Option<usize>,
 }
 
+/// Two quantities and by how much the second lags behind the first.
+type Class = (Quantity, Quantity, isize);
+
+fn class_of(a: Factor, b: Factor) -> Class {
+    (a.quantity, b.quantity, b.lag as isize - a.lag as isize)
+}
+
 impl Plan {
     pub fn new(terms: &[Term]) -> Self {
-        let mut variables: Vec<Factor> = terms.iter().flat_map(|t| t.factors().iter().copied()).collect();
-        variables.sort();
-        variables.dedup();
-        let place = |f: &Factor| variables.binary_search(f).unwrap_or(0);
-        let constant = terms.iter().position(|t| t.degree() == 0);
+        let mut factors: Vec<Factor> = terms.iter().flat_map(|t| t.factors().iter().copied()).collect();
+        factors.sort();
+        factors.dedup();
+        let mut len = 0;
+        let mut series: Vec<Series> = Vec::new();
+        let mut quantities: Vec<Quantity> = factors.iter().map(|f| f.quantity).collect();
+        quantities.dedup();
+        for quantity in quantities {
+            let most = factors.iter().filter(|f| f.quantity == quantity).map(|f| f.lag).max().unwrap_or(0);
+            series.push(Series { quantity, most, at: len });
+            len += most + TILE;
+        }
+        let place = |f: Factor| series.iter().find(|s| s.quantity == f.quantity).map_or(0, |s| s.at + s.most - f.lag);
+        // Each class of tails, with the smallest and largest lag of its first factor.
+        let mut classes: BTreeMap<Class, (usize, usize)> = BTreeMap::new();
         // (head, tail, column), in order of head and tail.
-        let mut split: Vec<(Vec<usize>, Vec<usize>, usize)> = terms
-            .iter()
-            .enumerate()
-            .filter(|(_, t)| t.degree() > 0)
-            .map(|(j, t)| {
-                let mut head: Vec<usize> = t.factors().iter().map(place).collect();
-                let tail = head.split_off(head.len().saturating_sub(2));
-                (head, tail, j)
-            })
-            .collect();
+        let mut split: Vec<(&[Factor], &[Factor], usize)> = Vec::new();
+        for (j, term) in terms.iter().enumerate().filter(|(_, t)| t.degree() > 0) {
+            let (head, tail) = term.factors().split_at(term.degree().saturating_sub(2));
+            if let [a, b] = *tail {
+                let range = classes.entry(class_of(a, b)).or_insert((a.lag, a.lag));
+                *range = (range.0.min(a.lag), range.1.max(a.lag));
+            }
+            split.push((head, tail, j));
+        }
         split.sort();
-        let mut pairs: Vec<(usize, usize)> =
-            split.iter().filter_map(|(_, tail, _)| (tail.len() == 2).then(|| (tail[0], tail[1]))).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        let lane = |tail: &[usize]| match *tail {
-            [a, b] => (variables.len() + pairs.binary_search(&(a, b)).unwrap_or(0)) * T,
-            _ => tail[0] * T,
+        let mut products = Vec::with_capacity(classes.len());
+        let mut begins: BTreeMap<Class, usize> = BTreeMap::new();
+        for (&class, &(least, most)) in &classes {
+            let first = Factor { quantity: class.0, lag: most };
+            let second = Factor { quantity: class.1, lag: most.saturating_add_signed(class.2) };
+            let own = TILE + most - least;
+            products.push(Product { factors: (place(first), place(second)), at: len, len: own });
+            begins.insert(class, len + most);
+            len += own;
+        }
+        let begin = |tail: &[Factor]| match *tail {
+            [a, b] => begins.get(&class_of(a, b)).map_or(0, |at| at - a.lag),
+            _ => place(tail[0]),
         };
         let mut nodes: Vec<Node> = Vec::new();
         let mut order = Vec::with_capacity(split.len());
-        for (head, tail, column) in &split {
-            if nodes.last().is_none_or(|n| n.head != *head) {
-                nodes.push(Node { head: head.clone(), tails: Vec::new(), first: order.len() });
+        let mut before: Option<&[Factor]> = None;
+        for (own_head, tail, column) in split {
+            if before != Some(own_head) {
+                let head = own_head.iter().map(|&f| place(f)).collect();
+                nodes.push(Node { head, tails: Vec::new(), first: order.len() });
+                before = Some(own_head);
             }
             if let Some(node) = nodes.last_mut() {
-                node.tails.push(lane(tail) as u32);
+                node.tails.push(begin(tail) as u32);
             }
-            order.push(*column);
+            order.push(column);
         }
-        Self { variables, pairs, nodes, order, constant }
-    }
-
-    /// Fills in the tails of two factors.
-    fn multiply_pairs(&self, tile: &mut [Lane], machine: Machine) {
-        let (single, double) = tile.split_at_mut(self.variables.len() * T);
-        for (&(a, b), out) in self.pairs.iter().zip(double.chunks_exact_mut(T)) {
-            multiply(&single[a * T..(a + 1) * T], &single[b * T..(b + 1) * T], out, machine);
-        }
+        let constant = terms.iter().position(|t| t.degree() == 0);
+        Self { series, products, len, nodes, order, constant }
     }
 
     /// Adds the products of all terms with `k` weights over one tile to `work.sums`.
@@ -110,10 +151,10 @@ impl Plan {
                     let weight = &weights[c * T..(c + 1) * T];
                     match node.head[..] {
                         [] => to.copy_from_slice(weight),
-                        [v, ..] => multiply(weight, &tile[v * T..(v + 1) * T], to, machine),
+                        [at, ..] => multiply(weight, &tile[at..at + TILE], to, machine),
                     }
-                    for &v in node.head.iter().skip(1) {
-                        multiply_into(to, &tile[v * T..(v + 1) * T]);
+                    for &at in node.head.iter().skip(1) {
+                        multiply_into(to, &tile[at..at + TILE]);
                     }
                 }
             }
@@ -142,18 +183,18 @@ fn common_tails(group: &[Node]) -> usize {
     (0..=shortest.tails.len()).rev().find(|&n| ends(n)).unwrap_or(0)
 }
 
-fn multiply_into(to: &mut [Lane], by: &[Lane]) {
-    for (a, b) in to.iter_mut().zip(by) {
-        for e in 0..LANE {
-            a.0[e] *= b.0[e];
+fn multiply_into(to: &mut [Lane], by: &[f64]) {
+    for (a, b) in to.iter_mut().zip(by.chunks_exact(LANE)) {
+        for (a, b) in a.0.iter_mut().zip(b) {
+            *a *= b;
         }
     }
 }
 
 /// The buffers of one block of samples.
 struct Work {
-    /// The variables and the tails of two factors.
-    tile: Vec<Lane>,
+    /// The series, and the products that tails of two factors are.
+    tile: Vec<f64>,
     weights: Vec<Lane>,
     heads: Vec<Lane>,
     /// `sums[c * places + place]`.
@@ -168,7 +209,7 @@ impl Work {
     fn new(plan: &Plan, k: usize) -> Self {
         let lanes = |n: usize| vec![Lane::default(); n];
         Self {
-            tile: lanes((plan.variables.len() + plan.pairs.len()) * T),
+            tile: vec![0.0; plan.len],
             weights: lanes(k * T),
             heads: lanes(k * (GROUP / k).max(1) * T),
             sums: lanes(plan.order.len() * k),
@@ -192,12 +233,38 @@ impl Design<'_> {
         }
     }
 
-    fn pack_tile(&self, work: &mut Work, at: usize, len: usize, machine: Machine) {
-        for (v, &f) in self.plan().variables.iter().enumerate() {
-            self.fill_factor(f, at..at + len, &mut work.plain[..len], |o, x| *o = x);
-            pack(&work.plain[..len], &mut work.tile[v * T..(v + 1) * T]);
+    /// Calls `f(at, len)` for the tiles of a range of rows; a tile lies within one stretch.
+    fn over_tiles(&self, rows: std::ops::Range<usize>, mut f: impl FnMut(&Stretch, usize, usize)) {
+        let stretches = self.stretches();
+        let mut which = stretches.partition_point(|s| s.row + s.len <= rows.start);
+        let mut at = rows.start;
+        while let Some(stretch) = stretches.get(which).filter(|_| at < rows.end) {
+            let end = rows.end.min(stretch.row + stretch.len);
+            while at < end {
+                let len = TILE.min(end - at);
+                f(stretch, at, len);
+                at += len;
+            }
+            which += 1;
         }
-        self.plan().multiply_pairs(&mut work.tile, machine);
+    }
+
+    /// Fills the tile's buffer for `len` rows from `at` on; places beyond them hold zeros or products with zeros.
+    fn fill_tile(&self, tile: &mut [f64], stretch: &Stretch, at: usize, len: usize) {
+        let plan = self.plan();
+        let first = stretch.first + (at - stretch.row);
+        for s in &plan.series {
+            let out = &mut tile[s.at..s.at + s.most + TILE];
+            let from = self.samples_of(stretch.record, s.quantity);
+            out[..s.most + len].copy_from_slice(&from[first - s.most..first + len]);
+            out[s.most + len..].fill(0.0);
+        }
+        let after_series = plan.products.first().map_or(tile.len(), |p| p.at);
+        let (series, rest) = tile.split_at_mut(after_series);
+        for p in &plan.products {
+            let (a, b) = (&series[p.factors.0..], &series[p.factors.1..]);
+            product(a, b, &mut rest[p.at - after_series..p.at - after_series + p.len]);
+        }
     }
 
     /// Norms of all columns and their products with `y`.
@@ -210,20 +277,18 @@ impl Design<'_> {
             let mut target = 0.0;
             // The squared norm of the constant is the number of rows; its product with y is the sum of y.
             let (mut sum, count) = (0.0, range.len() as f64);
-            let mut at = range.start;
-            while at < range.end {
-                let len = TILE.min(range.end - at);
+            self.over_tiles(range, |stretch, at, len| {
                 let w = &y[at..at + len];
                 target += hysid_linalg::dot(w, w);
                 sum += w.iter().sum::<f64>();
-                self.pack_tile(&mut work, at, len, machine);
+                self.fill_tile(&mut work.tile, stretch, at, len);
                 pack(w, &mut work.weights);
                 plan.accumulate(&mut work, 1, machine);
-                multiply(&work.tile, &work.tile, &mut squares.tile, machine);
-                squares.weights.fill(Lane([1.0; LANE]));
+                product(&work.tile, &work.tile, &mut squares.tile);
+                work.plain[..len].fill(1.0);
+                pack(&work.plain[..len], &mut squares.weights);
                 plan.accumulate(&mut squares, 1, machine);
-                at += len;
-            }
+            });
             let mut out = vec![0.0; 2 * m + 1];
             for (place, &j) in plan.order.iter().enumerate() {
                 out[j] = total(&squares.sums[place]);
@@ -246,18 +311,15 @@ impl Design<'_> {
         let partials = self.over_blocks(m * k * self.rows(), |range| {
             let mut work = Work::new(plan, k);
             let mut constant = vec![0.0; k];
-            let mut at = range.start;
-            while at < range.end {
-                let len = TILE.min(range.end - at);
-                self.pack_tile(&mut work, at, len, machine);
+            self.over_tiles(range, |stretch, at, len| {
+                self.fill_tile(&mut work.tile, stretch, at, len);
                 for (c, &j) in which.iter().enumerate() {
                     self.fill(j, at..at + len, &mut work.plain[..len]);
                     constant[c] += work.plain[..len].iter().sum::<f64>();
                     pack(&work.plain[..len], &mut work.weights[c * T..(c + 1) * T]);
                 }
                 plan.accumulate(&mut work, k, machine);
-                at += len;
-            }
+            });
             let mut out = vec![0.0; m * k];
             for (place, &j) in plan.order.iter().enumerate() {
                 for c in 0..k {

@@ -83,10 +83,10 @@ pub struct Step<'a> {
     pub rows: &'a [Row],
     /// The samples of the rows.
     pub left: &'a [Lane],
-    /// First lane in `right` of each column.
+    /// First sample in `right` of each column, of any alignment: columns may overlap (lags of one series).
     pub columns: &'a [u32],
     /// The samples of the columns.
-    pub right: &'a [Lane],
+    pub right: &'a [f64],
     /// Partial sums.
     pub out: &'a mut [Lane],
 }
@@ -121,8 +121,12 @@ fn fused(s: Step<'_>) {
     unsafe { step::<x86::Fused>(s) }
 }
 
-/// Products of two tiles, lane by lane.
-pub fn multiply(a: &[Lane], b: &[Lane], out: &mut [Lane], machine: Machine) {
+/// Products of a tile with as many samples of a series, whatever their alignment.
+///
+/// # Panics
+/// When `b` has fewer samples than `a`.
+pub fn multiply(a: &[Lane], b: &[f64], out: &mut [Lane], machine: Machine) {
+    assert!(b.len() >= a.len() * LANE, "{} samples for {} lanes", b.len(), a.len());
     match machine {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `detect` returned this form because the processor has these features.
@@ -134,7 +138,7 @@ pub fn multiply(a: &[Lane], b: &[Lane], out: &mut [Lane], machine: Machine) {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,fma")]
-fn multiply_wide(a: &[Lane], b: &[Lane], out: &mut [Lane]) {
+fn multiply_wide(a: &[Lane], b: &[f64], out: &mut [Lane]) {
     // SAFETY: this function has the features that the form needs.
     unsafe { multiply_in::<x86::Wide>(a, b, out) }
 }
@@ -149,6 +153,8 @@ trait Form {
     /// Columns in a register block of eight, four, two rows, and of one; zero rules a number of rows out.
     const BLOCK: [usize; 4];
     unsafe fn load(from: &Lane) -> Self::V;
+    /// Eight doubles from anywhere; they must be readable.
+    unsafe fn load_any(from: *const f64) -> Self::V;
     unsafe fn store(v: Self::V, to: &mut Lane);
     unsafe fn mul(a: Self::V, b: Self::V) -> Self::V;
     unsafe fn add(a: Self::V, b: Self::V) -> Self::V;
@@ -164,6 +170,11 @@ impl Form for Plain {
     #[inline(always)]
     unsafe fn load(from: &Lane) -> Lane {
         *from
+    }
+    #[inline(always)]
+    unsafe fn load_any(from: *const f64) -> Lane {
+        // SAFETY: the caller's; an array of doubles needs no more alignment than a double.
+        Lane(unsafe { *from.cast::<[f64; LANE]>() })
     }
     #[inline(always)]
     unsafe fn store(v: Lane, to: &mut Lane) {
@@ -202,6 +213,11 @@ mod x86 {
             unsafe { _mm512_load_pd(from.0.as_ptr()) }
         }
         #[inline(always)]
+        unsafe fn load_any(from: *const f64) -> __m512d {
+            // SAFETY: the caller's.
+            unsafe { _mm512_loadu_pd(from) }
+        }
+        #[inline(always)]
         unsafe fn store(v: __m512d, to: &mut Lane) {
             // SAFETY: as for `load`.
             unsafe { _mm512_store_pd(to.0.as_mut_ptr(), v) }
@@ -232,6 +248,11 @@ mod x86 {
             unsafe { (_mm256_load_pd(p), _mm256_load_pd(p.add(4))) }
         }
         #[inline(always)]
+        unsafe fn load_any(from: *const f64) -> Self::V {
+            // SAFETY: the caller's.
+            unsafe { (_mm256_loadu_pd(from), _mm256_loadu_pd(from.add(4))) }
+        }
+        #[inline(always)]
         unsafe fn store(v: Self::V, to: &mut Lane) {
             let p = to.0.as_mut_ptr();
             // SAFETY: as for `load`.
@@ -258,9 +279,10 @@ mod x86 {
 /// # Safety
 /// As for [`Form`].
 #[inline(always)]
-unsafe fn multiply_in<F: Form>(a: &[Lane], b: &[Lane], out: &mut [Lane]) {
-    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-        unsafe { F::store(F::mul(F::load(a), F::load(b)), o) };
+unsafe fn multiply_in<F: Form>(a: &[Lane], b: &[f64], out: &mut [Lane]) {
+    for ((o, a), b) in out.iter_mut().zip(a).zip(b.chunks_exact(LANE)) {
+        // SAFETY: the caller's; a chunk has the samples of a lane.
+        unsafe { F::store(F::mul(F::load(a), F::load_any(b.as_ptr())), o) };
     }
 }
 
@@ -318,17 +340,17 @@ unsafe fn block<F: Form, const K: usize, const L: usize>(
     at: usize,
     left: &[Lane],
     columns: &[u32],
-    right: &[Lane],
+    right: &[f64],
     out: &mut [Lane],
 ) -> usize {
     let a: [&[Lane]; K] = std::array::from_fn(|i| &left[rows[i].from..rows[i].from + t]);
-    let x: [&[Lane]; L] = std::array::from_fn(|l| &right[columns[l] as usize..columns[l] as usize + t]);
+    let x: [&[f64]; L] = std::array::from_fn(|l| &right[columns[l] as usize..columns[l] as usize + t * LANE]);
     // SAFETY: the caller's; all slices have t lanes.
     unsafe {
         let zero = F::load(&Lane([0.0; LANE]));
         let mut sums = [[zero; L]; K];
         for s in 0..t {
-            let b: [F::V; L] = std::array::from_fn(|l| F::load(x[l].get_unchecked(s)));
+            let b: [F::V; L] = std::array::from_fn(|l| F::load_any(x[l].as_ptr().add(s * LANE)));
             for i in 0..K {
                 let w = F::load(a[i].get_unchecked(s));
                 for l in 0..L {
@@ -357,7 +379,7 @@ mod tests {
         let lanes = |n: usize, from: usize| -> Vec<Lane> {
             (0..n).map(|i| Lane(std::array::from_fn(|e| value(from + i * LANE + e)))).collect()
         };
-        let tile = lanes(20 * t, 17);
+        let tile: Vec<f64> = (0..20 * (t * LANE - 3)).map(|i| value(17 + i)).collect();
         let mut machines = vec![Machine::Plain];
         if Machine::detect() != Machine::Plain {
             machines.push(Machine::Fused);
@@ -367,7 +389,8 @@ mod tests {
         }
         for (k, n) in [(1, 1), (1, 19), (2, 7), (3, 13), (4, 6), (7, 20), (8, 17), (15, 3), (9, 4), (12, 5)] {
             let left = lanes(k * t, 5000);
-            let columns: Vec<u32> = (0..n).map(|i| (i * t) as u32).collect();
+            // Columns that overlap, at odd places.
+            let columns: Vec<u32> = (0..n).map(|i| (i * (t * LANE - 5)) as u32).collect();
             let rows: Vec<Row> = (0..k).map(|i| Row { from: i * t, to: i * n }).collect();
             for &machine in &machines {
                 let mut out = vec![Lane::default(); n * k];
@@ -375,7 +398,8 @@ mod tests {
                 for l in 0..n {
                     for c in 0..k {
                         let at = |lanes: &[Lane], from: usize, s: usize| lanes[from + s / LANE].0[s % LANE];
-                        let expected: f64 = (0..t * LANE).map(|s| at(&left, c * t, s) * at(&tile, l * t, s)).sum();
+                        let expected: f64 =
+                            (0..t * LANE).map(|s| at(&left, c * t, s) * tile[columns[l] as usize + s]).sum();
                         let found = total(&out[c * n + l]);
                         assert!((found - expected).abs() < 1e-12, "{machine:?} {k} x {n}: {found} {expected}");
                     }

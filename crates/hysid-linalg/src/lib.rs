@@ -15,4 +15,4 @@ pub use columns::{Columns, Start, sum_over_blocks};
 pub use lstsq::{LinalgError, Lstsq, lstsq, solve_factor};
 pub use matrix::Matrix;
 pub use tall::TallQr;
-pub use vector::{dot, leave_one_out_sum, subtract_multiple, take_out};
+pub use vector::{dot, leave_one_out_sum, product, subtract_multiple, take_out};

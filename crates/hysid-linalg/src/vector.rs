@@ -44,6 +44,15 @@ both_forms! {
 }
 
 both_forms! {
+    /// out = a b, entry by entry.
+    pub fn product(a: &[f64], b: &[f64], out: &mut [f64]) {
+        for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
+            *o = a * b;
+        }
+    }
+}
+
+both_forms! {
     /// y -= a x.
     pub fn subtract_multiple(a: f64, x: &[f64], y: &mut [f64]) {
         for (y, x) in y.iter_mut().zip(x) {
