@@ -12,7 +12,7 @@ use crate::SelectError;
 /// columns, on long data a column that is not needed costs more than a pass.
 const PER_PASS: (usize, usize) = (8, 2);
 /// Samples times candidates from which data are long.
-const LONG: usize = 20_000_000;
+const LONG: usize = 1_000_000;
 
 /// The inner products of unit columns with each other and with the unit target.
 pub(crate) struct Moments<'a, C: ?Sized> {
