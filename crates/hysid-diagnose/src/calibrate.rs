@@ -1,30 +1,48 @@
-//! Where a fair calibration starts from: the user's values, and others within the bounds.
+//! Where a fair calibration starts from: the global calibration of `hysid-plant`, and the user's own values.
 
-use rand::RngExt;
+use hysid_plant::{Compiled, Data, Effort, Settings, Simulation};
 
-use crate::model::{Model, Unknown, Values};
-use crate::random::generator;
-use crate::refit::Problem;
+use crate::model::{Model, Values};
 
-/// Starts, the user's own values first.
-pub fn starts(model: &Model<'_>, seed: u64) -> Vec<Values> {
-    let own = model.theta(&Values::default());
-    let mut out = vec![model.values(&own)];
-    for i in 0..5 {
-        let mut rng = generator(seed, 0xCA1u64 << 32 | i);
-        let theta: Vec<f64> = own
-            .iter()
-            .enumerate()
-            .map(|(place, &x)| match model.unknowns()[place] {
-                Unknown::Parameter(_) => {
-                    let (lo, hi) = model.bounds()[place];
-                    let factor: f64 = (rng.random_range(-1.0..1.0f64) * 0.7).exp();
-                    (x * factor).clamp(lo, hi)
-                }
-                Unknown::Initial { .. } => x,
-            })
-            .collect();
-        out.push(model.values(&theta));
+/// Integration steps in each sampling period where the step-halving check gives no number, and the most that are spent.
+const SUBSTEPS: (usize, usize) = (2, 8);
+
+/// Starts, most promising first, and the integration steps in each period that the step-halving check asks for.
+pub fn starts(model: &Model<'_>, simulation: &Simulation, seed: u64) -> (Vec<Values>, usize) {
+    let own = model.values(&model.theta(&Values::default()));
+    let mut out = Vec::new();
+    let mut substeps = SUBSTEPS.0;
+    if let Some((values, steps)) = global(model, simulation, seed) {
+        out.push(values);
+        substeps = steps.clamp(1, SUBSTEPS.1);
     }
-    out
+    out.push(own);
+    (out, substeps)
+}
+
+/// The global calibration; `None` where it fails (the user's own values remain).
+fn global(model: &Model<'_>, simulation: &Simulation, seed: u64) -> Option<(Values, usize)> {
+    let compiled = Compiled::new(simulation).ok()?;
+    let data = model.data();
+    let mut all = Vec::new();
+    for s in &data.stretches {
+        let mut d = Data::new(&compiled, "", s.drive.clone(), s.outputs.clone()).ok()?;
+        d.offset = s.samples.start;
+        if s.samples.start > 0 {
+            d.free = (0..simulation.states.len()).collect();
+        }
+        all.push(d);
+    }
+    let settings = Settings { effort: Effort::Global, seed, gls_rounds: 0, iterations: 40, ..Settings::default() };
+    let c = compiled.calibrate(&all, &settings).ok()?;
+    let mut values = Values::default();
+    for (p, x) in simulation.parameters.iter().zip(&c.theta) {
+        values.parameters.insert(p.name.clone(), *x);
+    }
+    for (stretch, (d, initial)) in all.iter().zip(&c.initial).enumerate() {
+        for (&state, x) in d.free.iter().zip(initial) {
+            values.initials.insert((stretch, simulation.states.get(state)?.name.clone()), *x);
+        }
+    }
+    Some((values, c.steps.substeps))
 }

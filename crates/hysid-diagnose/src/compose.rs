@@ -118,19 +118,45 @@ fn starts(candidate: &Candidate, most: usize) -> Vec<Vec<(String, f64)>> {
     out
 }
 
-/// Refits one candidate on top of a hypothesis' simulation.
-pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
+/// A few iterations from a candidate's best start.
+fn sketch<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
+    let from = starting_values(setting, parent, candidate).into_iter().next()?;
+    let base = setting.fit(&candidate.refit.simulation, &from, Some(&parent.base.whitener), 1, 4)?;
+    Some(hypothesis(setting, parent, candidate, base))
+}
+
+/// The parent's values with each of the candidate's starts.
+fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
     let document = &candidate.refit.simulation;
-    let values =
-        with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
-    let mut best: Option<Base<'d>> = None;
-    for start in starts(candidate, 3) {
-        let mut from = values.clone();
-        for (name, x) in start {
-            if let Some(p) = document.parameter(&name) {
-                from.parameters.insert(name, x.clamp(p.lower(), p.upper()));
+    let values = with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
+    starts(candidate, 3)
+        .into_iter()
+        .map(|start| {
+            let mut from = values.clone();
+            for (name, x) in start {
+                if let Some(p) = document.parameter(&name) {
+                    from.parameters.insert(name, x.clamp(p.lower(), p.upper()));
+                }
             }
-        }
+            from
+        })
+        .collect()
+}
+
+/// Refits one candidate on top of a hypothesis' simulation; `begun` is a fit from its best start that has not converged.
+pub fn refit<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    begun: Option<Base<'d>>,
+) -> Option<Hypothesis<'d>> {
+    let document = &candidate.refit.simulation;
+    let mut froms = starting_values(setting, parent, candidate);
+    if let (Some(b), Some(first)) = (&begun, froms.first_mut()) {
+        *first = b.values();
+    }
+    let mut best: Option<Base<'d>> = begun;
+    for from in froms {
         let Some(base) = setting.fit(document, &from, Some(&parent.base.whitener), 1, setting.iterations) else {
             continue;
         };
@@ -146,6 +172,11 @@ pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Can
         Some(p) if p.log_likelihood > base.log_likelihood => p,
         _ => base,
     };
+    Some(hypothesis(setting, parent, candidate, base))
+}
+
+/// A fitted candidate as a hypothesis.
+fn hypothesis<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate, base: Base<'d>) -> Hypothesis<'d> {
     let mut effects = parent.effects.clone();
     effects.push(Effect {
         mechanism: candidate.mechanism,
@@ -154,7 +185,7 @@ pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Can
         concealment: candidate.concealment(),
     });
     let log_evidence = setting.evidence(&base);
-    Some(Hypothesis { effects, base, log_evidence })
+    Hypothesis { effects, base, log_evidence }
 }
 
 /// Line search over shapes that least squares cannot move: where the derivative by the shape vanishes or the shape stands where it began,
@@ -238,9 +269,28 @@ pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
     list
 }
 
+/// Log evidence by which a candidate may trail after a few iterations and still be refitted to the end.
+const HOPELESS: f64 = 60.0;
+
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
+///
+/// A few iterations from the best start tell who is hopeless; the others are refitted to the end, from all their starts.
 pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Candidate]) -> Vec<Hypothesis<'d>> {
-    let mut out: Vec<Hypothesis<'d>> = list.par_iter().filter_map(|c| refit(setting, parent, c)).collect();
+    let first: Vec<Option<Hypothesis<'d>>> = list.par_iter().map(|c| sketch(setting, parent, c)).collect();
+    let mut order: Vec<f64> = first.iter().flatten().map(|h| h.log_evidence).collect();
+    order.sort_by(|a, b| b.total_cmp(a));
+    let best = order.first().copied().unwrap_or(f64::NEG_INFINITY);
+    let fourth = order.get(3).copied().unwrap_or(f64::NEG_INFINITY);
+    let threshold = (best - HOPELESS).min(fourth);
+    let mut out: Vec<Hypothesis<'d>> = list
+        .par_iter()
+        .zip(first)
+        .filter_map(|(c, sketched)| match sketched {
+            Some(h) if h.log_evidence < threshold => Some(h),
+            Some(h) => refit(setting, parent, c, Some(h.base)),
+            None => refit(setting, parent, c, None),
+        })
+        .collect();
     out.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     out
 }
@@ -298,17 +348,22 @@ pub const LEAST_GAIN: f64 = 4.0;
 
 /// Extends the hypotheses of `pool` (all of one effect or more) until evidence stops growing, prunes the best and tries swaps.
 ///
-/// `enough` says whether time is up. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
+/// `unexplained` says whether something significant is left of a hypothesis' residual, `enough` whether time is up. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
 pub fn compose<'d>(
     setting: &Setting<'d>,
     none: &Hypothesis<'d>,
     pool: &mut Vec<Hypothesis<'d>>,
     options: SearchOptions,
+    unexplained: &dyn Fn(&Hypothesis<'d>) -> bool,
     enough: &(dyn Fn() -> bool + Sync),
 ) {
     for depth in 2..=options.depth {
         if enough() {
             return;
+        }
+        // Where nothing significant is left there is nothing to add.
+        if best_of(pool).is_none_or(|b| pool[b].effects.len() + 1 < depth || !unexplained(&pool[b])) {
+            break;
         }
         let best = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
         let parents = beam(pool, depth - 1, options.beam);

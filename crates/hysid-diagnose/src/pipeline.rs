@@ -76,6 +76,8 @@ pub struct Diagnosis {
 
 /// Most samples that the search works on; a longer recording is used in windows.
 const MOST_SAMPLES: usize = 24_000;
+/// Composition goes on while the mismatch that remains is significant at this level.
+const STOP_LEVEL: f64 = 0.02;
 /// Weight of the log evidence in the probabilities.
 pub const EVIDENCE_WEIGHT: f64 = 0.4;
 /// Log evidence that a further effect must bring before it counts.
@@ -164,7 +166,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             add(&mut pool, h);
         }
         (hooks.progress)("looking for a second and third effect");
-        compose(&setting, &none, &mut pool, SearchOptions { depth: 3, beam: 3, most: 6 }, hooks.expired);
+        let unexplained = |h: &Hypothesis<'_>| {
+            let evidence = h.base.evidence();
+            let rest = screen(&h.base, simulation, &evidence, &|_, _| true);
+            test_of(&rest, &h.base, &evidence, Options { alpha: STOP_LEVEL, ..options }).p_value < STOP_LEVEL
+        };
+        compose(&setting, &none, &mut pool, SearchOptions { depth: 3, beam: 3, most: 6 }, &unexplained, hooks.expired);
     }
     pool.insert(0, none);
     let winner = if significant { best_of(&pool).unwrap_or(0) } else { 0 };
@@ -276,8 +283,10 @@ fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Bas
     let start = model.theta(&Values::default());
     let diverged = model.simulate(&start).1;
     let mut best: Option<Base<'d>> = None;
-    for from in crate::calibrate::starts(&model, request.options.seed) {
-        let Some(b) = setting.fit(simulation, &from, None, 1, 30) else { continue };
+    let (starts, substeps) = crate::calibrate::starts(&model, simulation, request.options.seed);
+    setting.substeps = substeps;
+    for from in starts {
+        let Some(b) = setting.fit(simulation, &from, None, 1, 25) else { continue };
         let cost = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual);
         if best.as_ref().is_none_or(|x| cost(&b) < cost(x)) {
             best = Some(b);
