@@ -8,11 +8,11 @@ use hysid_plant::Simulation;
 use rayon::prelude::*;
 
 use crate::base::{Base, fit_simulation};
-use crate::data::DataSet;
+use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Rewritten};
 use crate::model::{Model, Values};
-use crate::refit::LmOptions;
+use crate::refit::{LmOptions, levenberg_marquardt};
 use crate::screen::{Candidate, screen, with_added_starts};
 use crate::slot::Slot;
 
@@ -50,6 +50,25 @@ impl Hypothesis<'_> {
         key.sort();
         key
     }
+}
+
+/// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest: log likelihood of the blocks, and the
+/// sum of squares of each block's rows for the standard error of a difference.
+pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Vec<f64>)> {
+    let data = setting.data;
+    let weights = held_out_blocks(&data.layout, &data.y);
+    let options = LmOptions { iterations: 5, ..LmOptions::default() };
+    let fit = levenberg_marquardt(&h.base.model, &h.base.fit.theta, &data.layout, &h.base.whitener, Some(&weights), options)?;
+    let white = h.base.whitener.apply(&data.layout, &fit.residual);
+    let (mut score, mut squares) = (0.0, Vec::new());
+    for s in &data.layout.series {
+        let scale = h.base.whitener.models[s.output].innovation().ln();
+        for row in s.rows.clone().filter(|&row| weights[row] == 0.0) {
+            score -= 0.5 * white[row] * white[row] + scale;
+            squares.push(fit.residual[row] * fit.residual[row]);
+        }
+    }
+    (!squares.is_empty()).then_some((score, squares))
 }
 
 /// What all fits share.
@@ -121,7 +140,7 @@ fn starts(candidate: &Candidate, most: usize) -> Vec<Vec<(String, f64)>> {
 /// A few iterations from a candidate's best start.
 fn sketch<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
     let from = starting_values(setting, parent, candidate).into_iter().next()?;
-    let base = setting.fit(&candidate.refit.simulation, &from, Some(&parent.base.whitener), 1, 4)?;
+    let base = setting.fit(&candidate.refit.simulation, &from, Some(&parent.base.whitener), 1, 3)?;
     Some(hypothesis(setting, parent, candidate, base))
 }
 
@@ -156,10 +175,16 @@ pub fn refit<'d>(
         *first = b.values();
     }
     let mut best: Option<Base<'d>> = begun;
-    for from in froms {
-        let Some(base) = setting.fit(document, &from, Some(&parent.base.whitener), 1, setting.iterations) else {
+    for (i, from) in froms.into_iter().enumerate() {
+        // Another start must come near the best in a few iterations to be followed.
+        let brief = if i == 0 { setting.iterations } else { 5 };
+        let Some(mut base) = setting.fit(document, &from, Some(&parent.base.whitener), 1, brief) else {
             continue;
         };
+        if i > 0 && best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood - 10.0) {
+            let longer = setting.fit(document, &base.values(), Some(&parent.base.whitener), 1, setting.iterations);
+            base = longer.unwrap_or(base);
+        }
         if best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood) {
             best = Some(base);
         }
@@ -270,7 +295,7 @@ pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
 }
 
 /// Log evidence by which a candidate may trail after a few iterations and still be refitted to the end.
-const HOPELESS: f64 = 60.0;
+const HOPELESS: f64 = 40.0;
 
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
 ///
@@ -390,7 +415,7 @@ pub fn compose<'d>(
         }
     }
     // Backward: drop each member of the best set, put another in its place.
-    for _ in 0..2 {
+    for _ in 0..1 {
         let Some(best) = best_of(pool) else { return };
         let n = pool[best].effects.len();
         if n < 2 || enough() {

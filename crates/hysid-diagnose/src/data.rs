@@ -185,6 +185,13 @@ impl DataSet {
         Self { period_s, recordings, stretches, layout, y, notes }
     }
 
+    /// One stretch with these inputs and outputs (`outputs[output][sample]`).
+    pub fn of_drive(drive: Drive, outputs: Vec<Vec<f64>>, period_s: f64) -> Self {
+        let count = outputs.len();
+        let stretch = Stretch { recording: 0, samples: 0..drive.len(), start_s: drive.start_s(), drive, outputs };
+        Self::from_stretches(period_s, vec![String::new()], vec![stretch], count, Vec::new())
+    }
+
     /// Number of samples to simulate.
     pub fn samples(&self) -> usize {
         self.stretches.iter().map(Stretch::len).sum()

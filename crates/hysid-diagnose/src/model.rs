@@ -305,6 +305,23 @@ impl<'d> Model<'d> {
         Some((prediction, columns))
     }
 
+    /// The stacked tangent response to a signal added at a place, one series for each stretch; `None` where it is not finite.
+    pub fn response_to(&self, theta: &[f64], place: hysid_plant::Slot, series: &[Vec<f64>]) -> Option<Vec<f64>> {
+        let parameters = self.parameters(theta, &[]);
+        let mut outputs = Vec::new();
+        for (s, signal) in series.iter().enumerate() {
+            let start = self.start_of(s, theta);
+            let run = self.run_of(s, &parameters, &start);
+            let mut sensitivity = self.compiled.sensitivities(&run, &[crate::openset::direction(place, signal)]);
+            if sensitivity.response.diverged.is_some() {
+                return None;
+            }
+            outputs.push(sensitivity.tangents.pop()?);
+        }
+        let stack = self.data.stack(&outputs);
+        stack.iter().all(|x| x.is_finite()).then_some(stack)
+    }
+
     /// The simulation with these values in it (initial values stay as the document has them).
     pub fn document(&self, theta: &[f64]) -> Simulation {
         let mut simulation = self.simulation().clone();

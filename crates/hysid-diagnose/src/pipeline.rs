@@ -1,23 +1,27 @@
 //! The steps of a diagnosis, in order: intake, calibration, test, screening, refit, composition, verdict, hold-out.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use hysid_plant::Simulation;
 use hysid_signal::Recording;
+use rayon::prelude::*;
 
 use crate::base::Base;
 use crate::bootstrap::{ratio_of_rms, rms};
-use crate::compose::{Hypothesis, SearchOptions, Setting, add, best_of, compose, refit_all, short_list};
+use crate::compose::{Hypothesis, Key, SearchOptions, Setting, add, best_of, block_score, compose, refit_all, short_list};
 use crate::data::{DataSet, held_out_blocks};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, SurrogateTest, TestOptions, detectable_amplitude, surrogate_test};
 use crate::file::*;
+use crate::experiment::{present_separation, propose};
 use crate::hold::{FreeRun, free_run};
 use crate::locate;
 use crate::mechanism::{Mechanism, number_with_unit};
 use crate::model::{Model, Values};
 use crate::picture::Picture;
+use crate::openset::correction;
 use crate::report_values::{reported, sentence};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
@@ -76,10 +80,17 @@ pub struct Diagnosis {
 
 /// Most samples that the search works on; a longer recording is used in windows.
 const MOST_SAMPLES: usize = 24_000;
+/// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
+const BETTER: f64 = 0.97;
 /// Composition goes on while the mismatch that remains is significant at this level.
 const STOP_LEVEL: f64 = 0.02;
 /// Weight of the log evidence in the probabilities.
 pub const EVIDENCE_WEIGHT: f64 = 0.4;
+/// The same where something significant is left of the best set: all models are then known to be wrong.
+const IMPERFECT_WEIGHT: f64 = 0.2;
+/// Log likelihood below which a law that contains another has gained nothing on it, and the weight of the evidence between the two.
+const NESTED_GAIN: f64 = 2.0;
+const NESTED_WEIGHT: f64 = 0.9;
 /// Log evidence that a further effect must bring before it counts.
 const PRICE_OF_AN_EFFECT: f64 = 4.0;
 
@@ -157,6 +168,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         notes,
         seed: options.seed,
     };
+    let tests: Tests = RefCell::default();
     let mut pool: Vec<Hypothesis<'_>> = Vec::new();
     let significant = test.p_value < options.alpha;
     if significant {
@@ -165,21 +177,23 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         for h in refit_all(&setting, &none, &list) {
             add(&mut pool, h);
         }
+        if let Some(h) = crate::numerics_check::artefact(&setting, &none) {
+            add(&mut pool, h);
+        }
         (hooks.progress)("looking for a second and third effect");
-        let unexplained = |h: &Hypothesis<'_>| {
-            let evidence = h.base.evidence();
-            let rest = screen(&h.base, simulation, &evidence, &|_, _| true);
-            test_of(&rest, &h.base, &evidence, Options { alpha: STOP_LEVEL, ..options }).p_value < STOP_LEVEL
-        };
-        compose(&setting, &none, &mut pool, SearchOptions { depth: 3, beam: 3, most: 6 }, &unexplained, hooks.expired);
+        let unexplained = |h: &Hypothesis<'_>| remains(h, simulation, options, &tests).p_value < STOP_LEVEL;
+        compose(&setting, &none, &mut pool, SearchOptions { depth: 3, beam: 2, most: 6 }, &unexplained, hooks.expired);
     }
     pool.insert(0, none);
-    let winner = if significant { best_of(&pool).unwrap_or(0) } else { 0 };
 
     (hooks.progress)("weighing the evidence");
     let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
-    let log: Vec<f64> = weighed.iter().map(|w| w.log_evidence).collect();
-    let probability = probabilities(&log, EVIDENCE_WEIGHT);
+    let blocks = block_scores(&setting, &pool, hooks.expired);
+    let winner = if significant { tie_broken(&pool, &blocks) } else { 0 };
+    let remaining = (!pool[winner].effects.is_empty()).then(|| remains(&pool[winner], simulation, options, &tests));
+    let imperfect = remaining.as_ref().is_some_and(|t| t.p_value < options.alpha);
+    let log = log_weights(&pool, &blocks, winner, if imperfect { IMPERFECT_WEIGHT } else { EVIDENCE_WEIGHT });
+    let probability = probabilities(&log, 1.0);
     let claims = weighed[winner].claims.clone();
     let support = supports(&claims, &weighed, &probability);
     file.verdict = verdict(&support);
@@ -205,20 +219,57 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if significant {
         file.alternatives = alternatives(&pool, &weighed, &probability, winner, file.verdict);
         file.location = location(&pool[0], best, &candidates);
+        // A change at one moment is where the recordings part from then on.
+        let moment = file.effects.iter().filter(|e| e.mechanism == "abrupt_change").find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"));
+        if let (Some(l), Some(moment), Some(last)) = (&mut file.location, moment, data.stretches.iter().filter(|s| s.recording == 0).next_back()) {
+            l.time_s = vec![[moment.value, last.start_s + last.len() as f64 * data.period_s]];
+        }
         let noise = best.base.whitener.models.iter().map(|m| m.noise_rms()).collect::<Vec<_>>();
         file.mismatch.noise_rms = by_column(simulation, &noise);
     }
-    if !best.effects.is_empty() {
-        let after = best.base.evidence();
-        let rest = screen(&best.base, simulation, &after, &|_, _| true);
-        let remaining = test_of(&rest, &best.base, &after, options);
+    if worse_on_blocks(&blocks, winner) && !best.effects.is_empty() {
+        file.verdict = VerdictKind::Ambiguous;
+        file.notes.push("the best set of effects predicts held-out blocks of the recordings worse than the simulation as it is: it is no improvement outside the data it was fitted to".into());
+    }
+    if significant && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous) && !(hooks.expired)() {
+        (hooks.progress)("looking for an experiment");
+        file.experiment = rival_of(&pool, &weighed, winner).and_then(|rival| {
+            let present = present_separation(&setting, best, &pool[rival]);
+            if let Some(d) = present {
+                for e in &pool[rival].effects {
+                    let listed =
+                        file.alternatives.iter_mut().find(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
+                    if let Some(a) = listed {
+                        a.separation = finite(d);
+                    }
+                }
+            }
+            propose(&setting, best, &pool[rival], present, options.seed)
+        });
+    }
+    if let Some(remaining) = remaining {
         let noise = noise_floor(best);
         let left =
             |e: &[f64]| data.layout.rms(e).iter().zip(&noise).map(|(r, n)| (r * r - n * n).max(0.0)).sum::<f64>();
         let share =
             (left(&best.base.fit.residual) / left(&pool[0].base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
-        file.remaining =
-            Some(RemainingRecord { p_value: remaining.p_value, share: if share.is_finite() { share } else { 0.0 } });
+        let share = if share.is_finite() { share } else { 0.0 };
+        file.remaining = Some(RemainingRecord { p_value: remaining.p_value, share });
+        if remaining.p_value < options.alpha && !(hooks.expired)() {
+            (hooks.progress)("modelling what remains");
+            if let Some(open) = correction(&best.base)
+                && open.block_ratio < BETTER
+            {
+                // An effect that is really there is still named; what most of the mismatch is decides the verdict.
+                if share > 0.5 || file.verdict == VerdictKind::Ambiguous {
+                    file.verdict = VerdictKind::NotInCatalogue;
+                }
+                file.correction = Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record });
+            }
+        }
+    } else if significant && let Some(open) = correction(&best.base) {
+        file.verdict = VerdictKind::NotInCatalogue;
+        file.correction = Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record });
     }
 
     (hooks.progress)("scoring on the hold-out");
@@ -272,6 +323,83 @@ fn split_blocks(all: &DataSet) -> (DataSet, DataSet) {
         }
     }
     (all.keep(|s, n, _| !out.contains(&(s, n))), all.keep(|s, n, _| out.contains(&(s, n))))
+}
+
+/// Tests of what remains, by statement: composition and the verdict ask for the same ones.
+type Tests = RefCell<BTreeMap<Key, SurrogateTest>>;
+
+/// The test of what remains of a hypothesis' residual.
+fn remains(h: &Hypothesis<'_>, simulation: &Simulation, options: Options, tests: &Tests) -> SurrogateTest {
+    let mut key = h.key();
+    // A better fit of the same statement is tested anew.
+    key.push(("", format!("{:.3}", h.log_evidence)));
+    if let Some(known) = tests.borrow().get(&key) {
+        return known.clone();
+    }
+    let evidence = h.base.evidence();
+    let rest = screen(&h.base, simulation, &evidence, &|_, _| true);
+    let test = test_of(&rest, &h.base, &evidence, options);
+    tests.borrow_mut().insert(key, test.clone());
+    test
+}
+
+/// Scores on held-out blocks of the hypotheses that are close to the best; `None` for the others.
+fn block_scores(setting: &Setting<'_>, pool: &[Hypothesis<'_>], expired: &(dyn Fn() -> bool + Sync)) -> Vec<Option<(f64, Vec<f64>)>> {
+    let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut near: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].log_evidence > top - 8.0).collect();
+    near.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
+    near.truncate(5);
+    (0..pool.len())
+        .into_par_iter()
+        .map(|i| if (near.contains(&i) && near.len() > 1 || i == 0) && !expired() { block_score(setting, &pool[i]) } else { None })
+        .collect()
+}
+
+/// The standing set, or one of its size that ties in evidence and predicts the held-out blocks better.
+fn tie_broken(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>]) -> usize {
+    let Some(standing) = best_of(pool) else { return 0 };
+    let score = |i: usize| blocks[i].as_ref().map_or(f64::NEG_INFINITY, |b| b.0);
+    (0..pool.len())
+        .filter(|&i| pool[i].effects.len() == pool[standing].effects.len() && pool[i].log_evidence > pool[standing].log_evidence - 3.0)
+        .filter(|&i| i == standing || score(i) > score(standing) + 3.0)
+        .max_by(|&a, &b| score(a).total_cmp(&score(b)))
+        .unwrap_or(standing)
+}
+
+/// Whether the winner predicts the held-out blocks worse than the simulation as it is, by more than two standard errors.
+fn worse_on_blocks(blocks: &[Option<(f64, Vec<f64>)>], winner: usize) -> bool {
+    let (Some(Some((_, none))), Some(Some((_, best)))) = (blocks.first(), blocks.get(winner)) else { return false };
+    // Sums over stretches of 20 rows: neighbouring errors are no independent witnesses.
+    let differences: Vec<f64> =
+        best.chunks(20).zip(none.chunks(20)).map(|(b, n)| b.iter().sum::<f64>() - n.iter().sum::<f64>()).collect();
+    let count = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / count;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    count > 4.0 && mean > 2.0 * (variance / count).sqrt()
+}
+
+/// Logarithms of the weights of the hypotheses.
+///
+/// Evidence counts with `weight`; what the held-out blocks say is part of it. A law that contains the winner's as a special case and gains
+/// nothing on it pays nearly the full price of its further parameters: data that settle a parameter at its neutral value do speak.
+fn log_weights(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>], winner: usize, weight: f64) -> Vec<f64> {
+    let best_block = blocks[winner].as_ref().map(|b| b.0);
+    let best = &pool[winner];
+    pool.iter()
+        .enumerate()
+        .map(|(i, h)| {
+            let mut log = weight * (h.log_evidence - PRICE_OF_AN_EFFECT * h.effects.len() as f64);
+            if let (Some(own), Some(best)) = (&blocks[i], best_block) {
+                log += 0.5 * weight * (own.0 - best).clamp(-10.0, 10.0);
+            }
+            let gain = h.base.log_likelihood - best.base.log_likelihood;
+            let contains = h.effects.iter().any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
+            if i != winner && h.effects.len() == best.effects.len() && contains && gain < NESTED_GAIN {
+                log += (NESTED_WEIGHT - weight).max(0.0) * (h.log_evidence - best.log_evidence).min(0.0);
+            }
+            log
+        })
+        .collect()
 }
 
 /// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
@@ -371,6 +499,14 @@ fn weigh(h: &Hypothesis<'_>) -> Weighed {
         claims: h.effects.iter().map(|e| claim(e.mechanism, &e.slot)).collect(),
         log_evidence: h.log_evidence - PRICE_OF_AN_EFFECT * h.effects.len() as f64,
     }
+}
+
+/// The likeliest set that names another mechanism than the winner.
+fn rival_of(pool: &[Hypothesis<'_>], weighed: &[Weighed], winner: usize) -> Option<usize> {
+    let names = |i: usize, id: &str| pool[i].effects.iter().any(|e| e.mechanism.id == id);
+    (0..pool.len())
+        .filter(|&i| pool[i].effects.iter().any(|e| !names(winner, e.mechanism.id)))
+        .max_by(|&a, &b| weighed[a].log_evidence.total_cmp(&weighed[b].log_evidence))
 }
 
 /// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it.

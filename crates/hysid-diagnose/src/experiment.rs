@@ -1,0 +1,172 @@
+//! What would separate two explanations: how far apart they are on this recording, and on which input they would part.
+//!
+//! The distance is what remains after the rival's own refit, `min over theta_B of |y_A - y_B(theta_B)|^2 / sigma^2`: below 9 the recording
+//! cannot tell them apart, 25 settles it. Inputs come from a library of shapes, bands and levels; for a simulation with several inputs the
+//! recorded ones are scaled instead, since prescribed motions hang together.
+//!
+//! Reference: W. G. Hunter and A. M. Reiner, Designs for discriminating between two rival models, Technometrics 7 (1965) 307-323.
+
+use hysid_plant::{Drive, Initial, Simulation};
+use hysid_signal::Excitation;
+use rayon::prelude::*;
+
+use crate::base::Base;
+use crate::compose::{Hypothesis, Setting};
+use crate::data::DataSet;
+use crate::evidence::{Whitener, norm2};
+use crate::file::ExperimentRecord;
+use crate::mechanism::excited_band;
+use crate::model::{Model, Values};
+use crate::refit::{LmOptions, levenberg_marquardt};
+use crate::text::number;
+
+/// Below this two explanations cannot be told apart.
+pub const SAME: f64 = 9.0;
+/// Iterations of the rival's refit.
+const ITERATIONS: usize = 5;
+/// Most samples of a tried experiment.
+const LONGEST: usize = 2000;
+
+/// Squared distance of a rival's best imitation from `truth`, in units of the noise.
+fn distance(document: &Simulation, values: &Values, data: &DataSet, own_states: &[String], substeps: usize, noise: &Whitener) -> Option<f64> {
+    let model = Model::new(document, data, own_states, substeps).ok()?;
+    let start = model.theta(values);
+    let fit = levenberg_marquardt(&model, &start, &data.layout, noise, None, LmOptions { iterations: ITERATIONS, tolerance: 1e-5 })?;
+    Some(norm2(&noise.apply(&data.layout, &fit.residual)))
+}
+
+/// Squared distance of `rival` from `winner` on the estimation data.
+pub fn present_separation(setting: &Setting<'_>, winner: &Hypothesis<'_>, rival: &Hypothesis<'_>) -> Option<f64> {
+    let truth = winner.base.model.predict(&winner.base.fit.theta)?;
+    let data = setting.data.with_outputs(truth);
+    distance(rival.base.model.simulation(), &rival.base.values(), &data, &setting.own_states, setting.substeps, &winner.base.whitener)
+}
+
+/// An input of the library.
+struct Trial {
+    shape: &'static str,
+    level: f64,
+    band: [f64; 2],
+    drive: Drive,
+}
+
+fn library(setting: &Setting<'_>, seed: u64) -> Vec<Trial> {
+    let Some(stretch) = setting.data.stretches.iter().max_by_key(|s| s.len()) else { return Vec::new() };
+    let n = stretch.len().min(LONGEST);
+    let period = setting.data.period_s;
+    let inputs = stretch.drive.inputs();
+    let Some(u) = inputs.first() else { return Vec::new() };
+    let mean = u.iter().sum::<f64>() / u.len() as f64;
+    let peak = u.iter().map(|x| (x - mean).abs()).fold(0.0, f64::max);
+    let band = excited_band(u, period);
+    let mut out = Vec::new();
+    let mut offer = |shape, level, band: (f64, f64), signals: Vec<Vec<f64>>| {
+        if let Ok(drive) = Drive::new(stretch.start_s, period, n, signals) {
+            out.push(Trial { shape, level, band: [band.0, band.1], drive });
+        }
+    };
+    if inputs.len() > 1 || setting.original.is_static() {
+        for level in [0.3, 0.6, 1.5, 2.0] {
+            let scaled = inputs.iter().map(|c| c[..n].iter().map(|x| level * x).collect()).collect();
+            offer("the recorded inputs", level, band, scaled);
+        }
+        return out;
+    }
+    // A one-sided input keeps its mean: a tank is not filled by a negative flow.
+    let one_sided = u.iter().all(|x| *x >= 0.0) && mean > 0.3 * peak;
+    let nyquist = 0.5 / period;
+    let (low, high) = (band.0.max(2.0 / (n as f64 * period)), band.1.min(0.4 * nyquist * 2.0));
+    let middle = (low * high).sqrt();
+    let shapes: Vec<(&'static str, (f64, f64), Excitation)> = vec![
+        ("multisine", (low, high), Excitation::Multisine { lowest_hz: low, highest_hz: high, period: 0 }),
+        ("low multisine", (low, middle), Excitation::Multisine { lowest_hz: low, highest_hz: middle, period: 0 }),
+        ("high multisine", (middle, high), Excitation::Multisine { lowest_hz: middle, highest_hz: high, period: 0 }),
+        ("chirp", (low, high), Excitation::Chirp { from_hz: low, to_hz: high }),
+        ("triangle", (low, low), Excitation::Triangle { frequency_hz: low.max(3.0 / (n as f64 * period)) }),
+        ("steps", (low, high), Excitation::Steps { hold: ((0.25 / middle / period) as usize).clamp(2, n / 8) }),
+        ("growing sine", (low, high), Excitation::Sine { frequency_hz: middle }),
+    ];
+    for (shape, range, excitation) in shapes {
+        let Ok(mut signal) = excitation.signal(n, period, 1.0, seed) else { continue };
+        if shape == "growing sine" {
+            signal.iter_mut().enumerate().for_each(|(i, x)| *x *= i as f64 / n as f64);
+        }
+        for level in [0.4, 2.0_f64] {
+            let level = if one_sided { level.min(mean / peak) } else { level };
+            offer(shape, level, range, vec![signal.iter().map(|x| mean + level * peak * x).collect()]);
+        }
+    }
+    out
+}
+
+/// The separation of two explanations on one input: the smaller of both directions.
+fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) -> Option<f64> {
+    let n = trial.drive.len();
+    let outputs = setting.original.outputs.len();
+    let started = |base: &Base<'_>| {
+        // A fresh experiment starts where the document says; free states start at zero.
+        let mut d = base.document();
+        d.states.iter_mut().filter(|s| s.initial == Initial::Free).for_each(|s| s.initial = Initial::Number(0.0));
+        d
+    };
+    let (da, db) = (started(a), started(b));
+    let one = |truth: &Simulation, noise: &Whitener, rival: &Simulation, rival_values: &Values| -> Option<f64> {
+        let empty = DataSet::of_drive(trial.drive.clone(), vec![vec![0.0; n]; outputs], setting.data.period_s);
+        let mut fixed = truth.clone();
+        fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
+        let model = Model::new(&fixed, &empty, &[], setting.substeps).ok()?;
+        let y = model.predict(&model.theta(&Values::default()))?;
+        let data = empty.with_outputs(y);
+        distance(rival, rival_values, &data, &[], setting.substeps, noise)
+    };
+    let forth = one(&da, &a.whitener, &db, &b.values())?;
+    let back = one(&db, &b.whitener, &da, &a.values())?;
+    Some(forth.min(back))
+}
+
+/// The experiment that would best separate two explanations.
+pub fn propose(setting: &Setting<'_>, a: &Hypothesis<'_>, b: &Hypothesis<'_>, present: Option<f64>, seed: u64) -> Option<ExperimentRecord> {
+    let name = |h: &Hypothesis<'_>| h.effects.iter().map(|e| e.mechanism.id).collect::<Vec<_>>().join(" + ");
+    let between = vec![name(a), name(b)];
+    let trials = library(setting, seed);
+    let found: Vec<Option<f64>> = trials.par_iter().map(|t| separation(setting, &a.base, &b.base, t)).collect();
+    let best = trials
+        .iter()
+        .zip(&found)
+        .filter_map(|(t, s)| s.filter(|s| s.is_finite()).map(|s| (t, s)))
+        .fold(None::<(&Trial, f64)>, |best, x| if best.is_none_or(|b| x.1 > b.1) { Some(x) } else { best });
+    let (trial, expected) = best?;
+    let separable = expected >= SAME;
+    let duration_s = trial.drive.len() as f64 * setting.data.period_s;
+    let sensor = (!separable).then(|| match setting.original.inputs.first() {
+        Some(u) => format!("a second sensor: the signal between the input `{}` and the moving part, or a velocity", u.column),
+        None => "a second sensor".to_owned(),
+    });
+    let (one, other) = (between[0].replace('_', " "), between[1].replace('_', " "));
+    let sentence = if separable {
+        format!(
+            "To tell {one} from {other}: a {} of {} times the recorded peak, {} to {} Hz, {} s long; expected squared separation {} (25 settles it), {} on this recording.",
+            trial.shape,
+            number(trial.level),
+            number(trial.band[0]),
+            number(trial.band[1]),
+            number(duration_s),
+            number(expected),
+            present.map_or_else(|| "not known".to_owned(), number)
+        )
+    } else {
+        format!("No input of the library would tell {one} from {other} (expected squared separation at most {}); {}.", number(expected), sensor.as_deref().unwrap_or("a further sensor"))
+    };
+    Some(ExperimentRecord {
+        sentence,
+        separable,
+        between,
+        shape: separable.then(|| trial.shape.to_owned()),
+        level: separable.then_some(trial.level),
+        band_hz: separable.then_some(trial.band),
+        duration_s: separable.then_some(duration_s),
+        expected_separation: Some(expected),
+        present_separation: present,
+        sensor,
+    })
+}
