@@ -1,7 +1,9 @@
 //! Where a fair calibration starts from: the global calibration of `hysid-plant`, and the user's own values.
 
-use hysid_plant::{Compiled, Data, Effort, Settings, Simulation};
+use hysid_plant::{Compiled, Effort, Settings, Simulation};
 
+use crate::column::plant_data;
+use crate::data::DataSet;
 use crate::model::{Model, Values};
 
 /// Integration steps in each sampling period where the step-halving check gives no number, and the most that are spent.
@@ -20,19 +22,24 @@ pub fn starts(model: &Model<'_>, simulation: &Simulation, seed: u64) -> (Vec<Val
     (out, substeps)
 }
 
+/// A simulation calibrated globally on a data set, with its rms error over all outputs; `None` where that fails.
+pub fn calibrated_copy(simulation: &Simulation, data: &DataSet, seed: u64) -> Option<(Simulation, f64)> {
+    let compiled = Compiled::new(simulation).ok()?;
+    let all = plant_data(&compiled, data)?;
+    let settings = Settings { effort: Effort::Global, seed, gls_rounds: 0, iterations: 60, ..Settings::default() };
+    let c = compiled.calibrate(&all, &settings).ok()?;
+    let mut copy = simulation.clone();
+    for (p, x) in copy.parameters.iter_mut().zip(&c.theta) {
+        p.value = *x;
+    }
+    let error = (c.rmse.iter().map(|e| e * e).sum::<f64>() / c.rmse.len().max(1) as f64).sqrt();
+    error.is_finite().then_some((copy, error))
+}
+
 /// The global calibration; `None` where it fails (the user's own values remain).
 fn global(model: &Model<'_>, simulation: &Simulation, seed: u64) -> Option<(Values, usize)> {
     let compiled = Compiled::new(simulation).ok()?;
-    let data = model.data();
-    let mut all = Vec::new();
-    for s in &data.stretches {
-        let mut d = Data::new(&compiled, "", s.drive.clone(), s.outputs.clone()).ok()?;
-        d.offset = s.samples.start;
-        if s.samples.start > 0 {
-            d.free = (0..simulation.states.len()).collect();
-        }
-        all.push(d);
-    }
+    let all = plant_data(&compiled, model.data())?;
     let settings = Settings { effort: Effort::Global, seed, gls_rounds: 0, iterations: 40, ..Settings::default() };
     let c = compiled.calibrate(&all, &settings).ok()?;
     let mut values = Values::default();

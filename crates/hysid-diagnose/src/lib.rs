@@ -12,6 +12,7 @@ pub mod verdict;
 mod base;
 mod bootstrap;
 mod calibrate;
+mod column;
 mod compose;
 mod data;
 mod draw;
@@ -28,6 +29,7 @@ mod report_values;
 mod screen;
 mod text;
 
+pub use column::{StandIn, stand_in};
 pub use bootstrap::{Ratio, ratio_of_rms, rms};
 pub use data::{DataSet, Stretch, held_out_blocks};
 pub use error::DiagnoseError;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use hysid_diagnose::{Hooks, Options, Request, diagnose};
+use hysid_diagnose::{Hooks, Options, Request, diagnose, stand_in};
 use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_plant::{ClockSource, Simulation};
 use hysid_signal::Recording;
@@ -86,7 +86,32 @@ fn work(args: &Args) -> Result<(), Failure> {
                 &hooks,
             )
         }
-        _ => return Err(Failure::BadInput("give a simulation file, or --simulated with --input and --output".into())),
+        (None, Some(column)) => {
+            let output = args.output.clone().unwrap_or_default();
+            let columns: Vec<String> = args.input.iter().cloned().chain([output.clone(), column.clone()]).collect();
+            let read_all = |files: &[PathBuf]| -> Result<Vec<Recording>, Failure> {
+                let options = ReadOptions { columns: Some(columns.clone()), ..ReadOptions::default() };
+                files.iter().map(|f| read(f, &options)).collect()
+            };
+            let estimation = read_all(&args.recording)?;
+            let holdout = read_all(&args.holdout)?;
+            progress("finding a clone of the simulated column");
+            let stand_in = stand_in(&args.input, &output, column, &estimation, args.seed).map_err(Failure::bad_input)?;
+            let request = Request {
+                simulation: &stand_in.simulation,
+                file: column,
+                estimation: &estimation,
+                holdout: &holdout,
+                options,
+            };
+            diagnose(&request, &hooks).map(|mut outcome| {
+                outcome.file.notes.insert(0, stand_in.note.clone());
+                outcome
+            })
+        }
+        (None, None) => {
+            return Err(Failure::BadInput("give a simulation file, or --simulated with --input and --output".into()));
+        }
     }
     .map_err(Failure::bad_input)?;
 
