@@ -29,7 +29,13 @@ pub struct StandIn {
 ///
 /// # Errors
 /// A missing column, a constant one, too few samples.
-pub fn stand_in(inputs: &[String], output: &str, simulated: &str, recordings: &[Recording], seed: u64) -> Result<StandIn, DiagnoseError> {
+pub fn stand_in(
+    inputs: &[String],
+    output: &str,
+    simulated: &str,
+    recordings: &[Recording],
+    seed: u64,
+) -> Result<StandIn, DiagnoseError> {
     let Some(first) = recordings.first() else { return Err(DiagnoseError::NoRecording) };
     let period_s = first.clock().period_s;
     let size = |name: &str| -> Result<f64, DiagnoseError> {
@@ -76,7 +82,8 @@ pub fn stand_in(inputs: &[String], output: &str, simulated: &str, recordings: &[
         -3.0 * scale,
         3.0 * scale
     );
-    let simulation = Simulation::parse(&text, "column").map_err(|e| DiagnoseError::Simulation { file: simulated.to_owned(), problem: e.to_string() })?;
+    let simulation = Simulation::parse(&text, "column")
+        .map_err(|e| DiagnoseError::Simulation { file: simulated.to_owned(), problem: e.to_string() })?;
     let note = format!(
         "the simulation is known by its column `{simulated}` only, and no linear clone up to fourth order follows it: \
          effects inside the plant cannot be told apart, only what stands at the output can be named; a simulation file says more"
@@ -91,10 +98,14 @@ fn clock(period_s: f64) -> String {
 /// Clones in order of size.
 fn clones(inputs: &[String], column: &str, period_s: f64, gain: f64, samples: usize) -> Vec<String> {
     let listed: String = inputs.iter().enumerate().map(|(i, c)| format!("u{} = \"{c}\"\n", i + 1)).collect();
-    let parameter = |name: &str, value: f64, low: f64, high: f64| format!("{name} = {{ value = {value:e}, min = {low:e}, max = {high:e} }}\n");
-    let gains: String = (1..=inputs.len()).map(|i| parameter(&format!("g{i}"), gain, -1e3 * gain, 1e3 * gain)).collect();
+    let parameter = |name: &str, value: f64, low: f64, high: f64| {
+        format!("{name} = {{ value = {value:e}, min = {low:e}, max = {high:e} }}\n")
+    };
+    let gains: String =
+        (1..=inputs.len()).map(|i| parameter(&format!("g{i}"), gain, -1e3 * gain, 1e3 * gain)).collect();
     let drive = (1..=inputs.len()).map(|i| format!("g{i}*u{i}")).collect::<Vec<_>>().join(" + ");
-    let head = format!("title = \"Clone of {column}\"\n[time]\n{}\n[inputs]\n{listed}[parameters]\n{gains}", clock(period_s));
+    let head =
+        format!("title = \"Clone of {column}\"\n[time]\n{}\n[inputs]\n{listed}[parameters]\n{gains}", clock(period_s));
     let length = samples as f64 * period_s;
     let slow = std::f64::consts::TAU * 2.0 / length;
     let fast = 1.5 / period_s;
@@ -147,7 +158,9 @@ mod tests {
     #[test]
     fn a_second_order_column_gets_a_close_clone() {
         let (n, h) = (1500, 0.02);
-        let u: Vec<f64> = (0..n).map(|i| (0.4 * (i as f64 * 0.11).sin() + (i as f64 * 0.031).sin() + 0.5 * (i as f64 * 0.29).cos()) * 3.0).collect();
+        let u: Vec<f64> = (0..n)
+            .map(|i| (0.4 * (i as f64 * 0.11).sin() + (i as f64 * 0.031).sin() + 0.5 * (i as f64 * 0.29).cos()) * 3.0)
+            .collect();
         let (mut x, mut v) = (0.0, 0.0);
         let mut s = Vec::new();
         for i in 0..n {

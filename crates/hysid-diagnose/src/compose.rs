@@ -58,7 +58,8 @@ pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Ve
     let data = setting.data;
     let weights = held_out_blocks(&data.layout, &data.y);
     let options = LmOptions { iterations: 5, ..LmOptions::default() };
-    let fit = levenberg_marquardt(&h.base.model, &h.base.fit.theta, &data.layout, &h.base.whitener, Some(&weights), options)?;
+    let fit =
+        levenberg_marquardt(&h.base.model, &h.base.fit.theta, &data.layout, &h.base.whitener, Some(&weights), options)?;
     let white = h.base.whitener.apply(&data.layout, &fit.residual);
     let (mut score, mut squares) = (0.0, Vec::new());
     for s in &data.layout.series {
@@ -147,7 +148,8 @@ fn sketch<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candid
 /// The parent's values with each of the candidate's starts.
 fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
     let document = &candidate.refit.simulation;
-    let values = with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
+    let values =
+        with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
     starts(candidate, 3)
         .into_iter()
         .map(|start| {
@@ -201,7 +203,12 @@ pub fn refit<'d>(
 }
 
 /// A fitted candidate as a hypothesis.
-fn hypothesis<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate, base: Base<'d>) -> Hypothesis<'d> {
+fn hypothesis<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    base: Base<'d>,
+) -> Hypothesis<'d> {
     let mut effects = parent.effects.clone();
     effects.push(Effect {
         mechanism: candidate.mechanism,

@@ -28,10 +28,24 @@ const ITERATIONS: usize = 5;
 const LONGEST: usize = 2000;
 
 /// Squared distance of a rival's best imitation from `truth`, in units of the noise.
-fn distance(document: &Simulation, values: &Values, data: &DataSet, own_states: &[String], substeps: usize, noise: &Whitener) -> Option<f64> {
+fn distance(
+    document: &Simulation,
+    values: &Values,
+    data: &DataSet,
+    own_states: &[String],
+    substeps: usize,
+    noise: &Whitener,
+) -> Option<f64> {
     let model = Model::new(document, data, own_states, substeps).ok()?;
     let start = model.theta(values);
-    let fit = levenberg_marquardt(&model, &start, &data.layout, noise, None, LmOptions { iterations: ITERATIONS, tolerance: 1e-5 })?;
+    let fit = levenberg_marquardt(
+        &model,
+        &start,
+        &data.layout,
+        noise,
+        None,
+        LmOptions { iterations: ITERATIONS, tolerance: 1e-5 },
+    )?;
     Some(norm2(&noise.apply(&data.layout, &fit.residual)))
 }
 
@@ -39,7 +53,14 @@ fn distance(document: &Simulation, values: &Values, data: &DataSet, own_states: 
 pub fn present_separation(setting: &Setting<'_>, winner: &Hypothesis<'_>, rival: &Hypothesis<'_>) -> Option<f64> {
     let truth = winner.base.model.predict(&winner.base.fit.theta)?;
     let data = setting.data.with_outputs(truth);
-    distance(rival.base.model.simulation(), &rival.base.values(), &data, &setting.own_states, setting.substeps, &winner.base.whitener)
+    distance(
+        rival.base.model.simulation(),
+        &rival.base.values(),
+        &data,
+        &setting.own_states,
+        setting.substeps,
+        &winner.base.whitener,
+    )
 }
 
 /// An input of the library.
@@ -125,7 +146,13 @@ fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) 
 }
 
 /// The experiment that would best separate two explanations.
-pub fn propose(setting: &Setting<'_>, a: &Hypothesis<'_>, b: &Hypothesis<'_>, present: Option<f64>, seed: u64) -> Option<ExperimentRecord> {
+pub fn propose(
+    setting: &Setting<'_>,
+    a: &Hypothesis<'_>,
+    b: &Hypothesis<'_>,
+    present: Option<f64>,
+    seed: u64,
+) -> Option<ExperimentRecord> {
     let name = |h: &Hypothesis<'_>| h.effects.iter().map(|e| e.mechanism.id).collect::<Vec<_>>().join(" + ");
     let between = vec![name(a), name(b)];
     let trials = library(setting, seed);
@@ -139,7 +166,9 @@ pub fn propose(setting: &Setting<'_>, a: &Hypothesis<'_>, b: &Hypothesis<'_>, pr
     let separable = expected >= SAME;
     let duration_s = trial.drive.len() as f64 * setting.data.period_s;
     let sensor = (!separable).then(|| match setting.original.inputs.first() {
-        Some(u) => format!("a second sensor: the signal between the input `{}` and the moving part, or a velocity", u.column),
+        Some(u) => {
+            format!("a second sensor: the signal between the input `{}` and the moving part, or a velocity", u.column)
+        }
         None => "a second sensor".to_owned(),
     });
     let (one, other) = (between[0].replace('_', " "), between[1].replace('_', " "));
@@ -155,7 +184,11 @@ pub fn propose(setting: &Setting<'_>, a: &Hypothesis<'_>, b: &Hypothesis<'_>, pr
             present.map_or_else(|| "not known".to_owned(), number)
         )
     } else {
-        format!("No input of the library would tell {one} from {other} (expected squared separation at most {}); {}.", number(expected), sensor.as_deref().unwrap_or("a further sensor"))
+        format!(
+            "No input of the library would tell {one} from {other} (expected squared separation at most {}); {}.",
+            number(expected),
+            sensor.as_deref().unwrap_or("a further sensor")
+        )
     };
     Some(ExperimentRecord {
         sentence,

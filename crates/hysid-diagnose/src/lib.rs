@@ -29,8 +29,8 @@ mod report_values;
 mod screen;
 mod text;
 
-pub use column::{StandIn, stand_in};
 pub use bootstrap::{Ratio, ratio_of_rms, rms};
+pub use column::{StandIn, stand_in};
 pub use data::{DataSet, Stretch, held_out_blocks};
 pub use error::DiagnoseError;
 pub use model::{Model, Outputs, Unknown, Values};

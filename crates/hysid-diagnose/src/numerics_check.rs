@@ -1,8 +1,8 @@
 //! Is it the simulation's own numerics? Variants of step, hold, clock and smoothing, fitted like any other explanation.
 
 use crate::compose::{Effect, Hypothesis, Setting};
-use crate::mechanism::numerics::{SOLVER_ARTEFACT, variants};
 use crate::mechanism::Rewritten;
+use crate::mechanism::numerics::{SOLVER_ARTEFACT, variants};
 use crate::slot::{Slot, Structure};
 
 /// Log likelihood that a variant must gain to be listed at all.
@@ -17,7 +17,9 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
         let Some(first) = variant.simulation else { continue };
         let mut document = first;
         for round in 0..AGAIN {
-            let Some(base) = setting.fit(&document, &none.base.values(), Some(&none.base.whitener), 2, 12) else { break };
+            let Some(base) = setting.fit(&document, &none.base.values(), Some(&none.base.whitener), 2, 12) else {
+                break;
+            };
             let evidence = setting.evidence(&base);
             let reached = best.as_ref().map_or(none.log_evidence + LEAST, |b| b.log_evidence);
             if evidence <= reached {
@@ -52,7 +54,8 @@ fn changed(setting: &Setting<'_>, document: &hysid_plant::Simulation) -> Option<
     let original = &setting.original;
     let structure = Structure::of(original);
     let state = original.states.iter().find(|s| document.state(&s.name).is_some_and(|d| d.derivative != s.derivative));
-    let output = original.outputs.iter().find(|o| document.output(&o.column).is_some_and(|d| d.expression != o.expression));
+    let output =
+        original.outputs.iter().find(|o| document.output(&o.column).is_some_and(|d| d.expression != o.expression));
     let label = match (state, output, original.inputs.first()) {
         (Some(s), _, _) => format!("state:{}", s.name),
         (None, Some(o), _) => format!("output:{}", o.column),

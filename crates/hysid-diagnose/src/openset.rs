@@ -57,7 +57,8 @@ fn shapes(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<(String, Kind, Vec<
     let mut size: Vec<f64> = all.iter().map(|v| v.abs()).collect();
     size.sort_by(f64::total_cmp);
     let quantile = |q: f64| size.get(((size.len() as f64 - 1.0) * q) as usize).copied().unwrap_or(0.0);
-    let map = |f: &dyn Fn(f64) -> f64| -> Vec<Vec<f64>> { x.iter().map(|s| s.iter().map(|v| f(*v)).collect()).collect() };
+    let map =
+        |f: &dyn Fn(f64) -> f64| -> Vec<Vec<f64>> { x.iter().map(|s| s.iter().map(|v| f(*v)).collect()).collect() };
     let number = crate::text::number;
     let mut out: Vec<(String, Kind, Vec<Vec<f64>>)> = vec![
         (format!("{name}^2"), Kind::Even, map(&|v| v * v)),
@@ -115,19 +116,32 @@ fn terms(base: &Base<'_>) -> Vec<Term> {
             .filter_map(|n| slot.quantity(n).map(|q| ((*n).to_owned(), q.expression.clone(), *n == "v")))
             .map(|(n, e, v)| (if let Expr::Symbol(s) = &e { s.clone() } else { n }, e, v))
             .collect::<Vec<_>>();
-        let coordinates = if coordinates.is_empty() { vec![(state.name.clone(), Expr::symbol(&state.name), false)] } else { coordinates };
+        let coordinates = if coordinates.is_empty() {
+            vec![(state.name.clone(), Expr::symbol(&state.name), false)]
+        } else {
+            coordinates
+        };
         places.push((Place::State(i), label, "plant", coordinates));
     }
     for (i, input) in simulation.inputs.iter().enumerate() {
         let label = format!("input:{}", input.symbol);
         if !simulation.is_static() && own.contains(&label.as_str()) {
-            places.push((Place::Input(i), label, "input", vec![(input.symbol.clone(), Expr::symbol(&input.symbol), false)]));
+            places.push((
+                Place::Input(i),
+                label,
+                "input",
+                vec![(input.symbol.clone(), Expr::symbol(&input.symbol), false)],
+            ));
         }
     }
     for (i, output) in simulation.outputs.iter().enumerate() {
         let label = format!("output:{}", output.column);
         let coordinates = if simulation.is_static() {
-            simulation.inputs.iter().map(|u| (u.symbol.clone(), Expr::symbol(&u.symbol), u.symbol.starts_with('v'))).collect()
+            simulation
+                .inputs
+                .iter()
+                .map(|u| (u.symbol.clone(), Expr::symbol(&u.symbol), u.symbol.starts_with('v')))
+                .collect()
         } else {
             vec![("y".to_owned(), output.expression.clone(), false)]
         };
@@ -158,12 +172,21 @@ fn terms(base: &Base<'_>) -> Vec<Term> {
                                 .collect()
                         })
                         .collect();
-                    work.push((place, label.clone(), side, format!("{name} - lag({name}, {})", crate::text::number(tau)), Kind::Lag, lag));
+                    work.push((
+                        place,
+                        label.clone(),
+                        side,
+                        format!("{name} - lag({name}, {})", crate::text::number(tau)),
+                        Kind::Lag,
+                        lag,
+                    ));
                 }
                 let drift = x
                     .iter()
                     .zip(&data.stretches)
-                    .map(|(s, st)| s.iter().enumerate().map(|(n, v)| v * (st.start_s + n as f64 * data.period_s)).collect())
+                    .map(|(s, st)| {
+                        s.iter().enumerate().map(|(n, v)| v * (st.start_s + n as f64 * data.period_s)).collect()
+                    })
                     .collect();
                 work.push((place, label.clone(), side, format!("t*{name}"), Kind::Time, drift));
             }
@@ -171,7 +194,9 @@ fn terms(base: &Base<'_>) -> Vec<Term> {
         if let ([(a, _, _), (b, _, _)], [x, v]) = (coordinates.as_slice(), series.as_slice())
             && side == "plant"
         {
-            let pair = |f: &dyn Fn(f64, f64) -> f64| -> Vec<Vec<f64>> { x.iter().zip(v).map(|(x, v)| x.iter().zip(v).map(|(x, v)| f(*x, *v)).collect()).collect() };
+            let pair = |f: &dyn Fn(f64, f64) -> f64| -> Vec<Vec<f64>> {
+                x.iter().zip(v).map(|(x, v)| x.iter().zip(v).map(|(x, v)| f(*x, *v)).collect()).collect()
+            };
             for (text, kind, s) in [
                 (format!("{a}^2*{b}"), Kind::Odd, pair(&|x, v| x * x * v)),
                 (format!("{a}*{b}^2"), Kind::Odd, pair(&|x, v| x * v * v)),
@@ -255,7 +280,9 @@ pub fn correction(base: &Base<'_>) -> Option<OpenSet> {
 fn solve(columns: &[&Vec<f64>], r: &[f64], weights: &[f64]) -> Vec<f64> {
     let k = columns.len();
     let weighted: Vec<Vec<f64>> = columns.iter().map(|c| c.iter().zip(weights).map(|(c, w)| c * w).collect()).collect();
-    let gram = nalgebra::DMatrix::from_fn(k, k, |a, b| dot(&weighted[a], &weighted[b]) * if a == b { 1.0 + 1e-9 } else { 1.0 });
+    let gram = nalgebra::DMatrix::from_fn(k, k, |a, b| {
+        dot(&weighted[a], &weighted[b]) * if a == b { 1.0 + 1e-9 } else { 1.0 }
+    });
     let rhs = nalgebra::DVector::from_fn(k, |a, _| dot(&weighted[a], r));
     gram.cholesky().map_or_else(|| vec![0.0; k], |c| c.solve(&rhs).iter().copied().collect())
 }
@@ -297,7 +324,12 @@ fn signature(
         .fold(("plant", f64::NEG_INFINITY), |best, x| if x.1 > best.1 { x } else { best })
         .0;
     let energy = |wanted: &dyn Fn(Kind) -> bool| -> f64 {
-        chosen.iter().zip(coefficients).filter(|(i, _)| wanted(terms[**i].kind)).map(|(i, c)| c * c * norm2(&terms[*i].column)).sum()
+        chosen
+            .iter()
+            .zip(coefficients)
+            .filter(|(i, _)| wanted(terms[**i].kind))
+            .map(|(i, c)| c * c * norm2(&terms[*i].column))
+            .sum()
     };
     let (odd, even) = (energy(&|k| k != Kind::Even), energy(&|k| k == Kind::Even));
     let symmetry = if odd > 9.0 * even {
@@ -307,7 +339,12 @@ fn signature(
     } else {
         "mixed"
     };
-    SignatureRecord { memory: memory.into(), rate_dependent: memory == "rate_dependent", symmetry: symmetry.into(), side: side.into() }
+    SignatureRecord {
+        memory: memory.into(),
+        rate_dependent: memory == "rate_dependent",
+        symmetry: symmetry.into(),
+        side: side.into(),
+    }
 }
 
 /// The direction of a generic signal.

@@ -9,19 +9,21 @@ use rayon::prelude::*;
 
 use crate::base::Base;
 use crate::bootstrap::{ratio_of_rms, rms};
-use crate::compose::{Hypothesis, Key, SearchOptions, Setting, add, best_of, block_score, compose, refit_all, short_list};
+use crate::compose::{
+    Hypothesis, Key, SearchOptions, Setting, add, best_of, block_score, compose, refit_all, short_list,
+};
 use crate::data::{DataSet, held_out_blocks};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, SurrogateTest, TestOptions, detectable_amplitude, surrogate_test};
-use crate::file::*;
 use crate::experiment::{present_separation, propose};
+use crate::file::*;
 use crate::hold::{FreeRun, free_run};
 use crate::locate;
 use crate::mechanism::{Mechanism, number_with_unit};
 use crate::model::{Model, Values};
-use crate::picture::Picture;
 use crate::openset::correction;
+use crate::picture::Picture;
 use crate::report_values::{reported, sentence};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
@@ -220,8 +222,14 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         file.alternatives = alternatives(&pool, &weighed, &probability, winner, file.verdict);
         file.location = location(&pool[0], best, &candidates);
         // A change at one moment is where the recordings part from then on.
-        let moment = file.effects.iter().filter(|e| e.mechanism == "abrupt_change").find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"));
-        if let (Some(l), Some(moment), Some(last)) = (&mut file.location, moment, data.stretches.iter().filter(|s| s.recording == 0).next_back()) {
+        let moment = file
+            .effects
+            .iter()
+            .filter(|e| e.mechanism == "abrupt_change")
+            .find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"));
+        if let (Some(l), Some(moment), Some(last)) =
+            (&mut file.location, moment, data.stretches.iter().filter(|s| s.recording == 0).next_back())
+        {
             l.time_s = vec![[moment.value, last.start_s + last.len() as f64 * data.period_s]];
         }
         let noise = best.base.whitener.models.iter().map(|m| m.noise_rms()).collect::<Vec<_>>();
@@ -344,14 +352,24 @@ fn remains(h: &Hypothesis<'_>, simulation: &Simulation, options: Options, tests:
 }
 
 /// Scores on held-out blocks of the hypotheses that are close to the best; `None` for the others.
-fn block_scores(setting: &Setting<'_>, pool: &[Hypothesis<'_>], expired: &(dyn Fn() -> bool + Sync)) -> Vec<Option<(f64, Vec<f64>)>> {
+fn block_scores(
+    setting: &Setting<'_>,
+    pool: &[Hypothesis<'_>],
+    expired: &(dyn Fn() -> bool + Sync),
+) -> Vec<Option<(f64, Vec<f64>)>> {
     let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     let mut near: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].log_evidence > top - 8.0).collect();
     near.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
     near.truncate(5);
     (0..pool.len())
         .into_par_iter()
-        .map(|i| if (near.contains(&i) && near.len() > 1 || i == 0) && !expired() { block_score(setting, &pool[i]) } else { None })
+        .map(|i| {
+            if (near.contains(&i) && near.len() > 1 || i == 0) && !expired() {
+                block_score(setting, &pool[i])
+            } else {
+                None
+            }
+        })
         .collect()
 }
 
@@ -360,7 +378,10 @@ fn tie_broken(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>]) -> us
     let Some(standing) = best_of(pool) else { return 0 };
     let score = |i: usize| blocks[i].as_ref().map_or(f64::NEG_INFINITY, |b| b.0);
     (0..pool.len())
-        .filter(|&i| pool[i].effects.len() == pool[standing].effects.len() && pool[i].log_evidence > pool[standing].log_evidence - 3.0)
+        .filter(|&i| {
+            pool[i].effects.len() == pool[standing].effects.len()
+                && pool[i].log_evidence > pool[standing].log_evidence - 3.0
+        })
         .filter(|&i| i == standing || score(i) > score(standing) + 3.0)
         .max_by(|&a, &b| score(a).total_cmp(&score(b)))
         .unwrap_or(standing)
@@ -393,7 +414,8 @@ fn log_weights(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>], winn
                 log += 0.5 * weight * (own.0 - best).clamp(-10.0, 10.0);
             }
             let gain = h.base.log_likelihood - best.base.log_likelihood;
-            let contains = h.effects.iter().any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
+            let contains =
+                h.effects.iter().any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
             if i != winner && h.effects.len() == best.effects.len() && contains && gain < NESTED_GAIN {
                 log += (NESTED_WEIGHT - weight).max(0.0) * (h.log_evidence - best.log_evidence).min(0.0);
             }

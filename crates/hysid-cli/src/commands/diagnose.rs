@@ -96,7 +96,8 @@ fn work(args: &Args) -> Result<(), Failure> {
             let estimation = read_all(&args.recording)?;
             let holdout = read_all(&args.holdout)?;
             progress("finding a clone of the simulated column");
-            let stand_in = stand_in(&args.input, &output, column, &estimation, args.seed).map_err(Failure::bad_input)?;
+            let stand_in =
+                stand_in(&args.input, &output, column, &estimation, args.seed).map_err(Failure::bad_input)?;
             let request = Request {
                 simulation: &stand_in.simulation,
                 file: column,
