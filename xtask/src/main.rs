@@ -5,6 +5,7 @@ mod catalogue;
 mod ci;
 mod layers;
 mod prove;
+mod recordings;
 mod reproduce;
 
 use std::path::{Path, PathBuf};
@@ -27,6 +28,7 @@ enum Task {
     /// Check the house rules of `xtask/layers.toml`.
     Layers,
     Prove(prove::Args),
+    Recordings(recordings::Args),
     Reproduce(reproduce::Args),
 }
 
@@ -41,6 +43,7 @@ fn main() -> anyhow::Result<()> {
         Task::Catalogue(args) => catalogue::run(&args),
         Task::Ci(args) => ci::run(&args),
         Task::Prove(args) => prove::run(&args),
+        Task::Recordings(args) => recordings::run(&args),
         Task::Reproduce(args) => reproduce::run(&args),
         Task::Layers => {
             let found = layers::breaches(&root())?;

@@ -1,6 +1,6 @@
 //! The identified model: terms with coefficients, immutable, and what it predicts.
 
-use hysid_dictionary::{Record, Signal, Signals, Term};
+use hysid_dictionary::{Record, Signals, Term};
 
 use crate::program::Program;
 use crate::run::{Rules, run};
@@ -288,14 +288,5 @@ impl NarxModel {
             }
         }
         Ok(Prediction { y, diverged_at })
-    }
-
-    /// Whether a factor of a term is a sign of a difference of the output: the model is then discontinuous in its own output.
-    pub fn switches_on_output(&self) -> bool {
-        self.parts
-            .coefficients
-            .iter()
-            .flat_map(|c| c.term.factors())
-            .any(|f| f.quantity.is_sign() && f.quantity.signal() == Signal::Output)
     }
 }
