@@ -36,7 +36,7 @@ fn duffing(u: &[f64]) -> Vec<f64> {
 fn refinement_undoes_the_bias_of_least_squares_under_output_noise() {
     let n = 3000;
     let u = noise(n, 1);
-    let y: Vec<f64> = duffing(&u).iter().zip(noise(n, 2)).map(|(y, e)| y + 0.02 * e).collect();
+    let y: Vec<f64> = duffing(&u).iter().zip(noise(n, 2)).map(|(y, e)| y + 0.1 * e).collect();
     let signals = Signals::siso();
     let list = terms(&signals, &["y[n-1]", "y[n-2]", "y[n-1]^3", "u[n-1]"]);
     let mut trainer = Trainer::new(signals, vec![], &[Record::siso(&u, &y)], 2, 100.0).unwrap();
@@ -44,13 +44,13 @@ fn refinement_undoes_the_bias_of_least_squares_under_output_noise() {
     let truth = [1.5, -0.9, -0.1, 0.2];
     let off = |theta: &[f64]| theta.iter().zip(truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let (fit, error) = trainer.refine(ls.clone(), &all(n), 30, Refine::Coefficients).unwrap();
-    assert!(off(&ls.theta) > 0.01, "{:?}", ls.theta);
-    assert!(off(&fit.theta) < 0.006 && off(&fit.theta) < 0.4 * off(&ls.theta), "{:?}", fit.theta);
-    assert!((error.rmse - 0.02).abs() < 0.001, "{}", error.rmse);
+    assert!(off(&ls.theta) > 0.04, "{:?}", ls.theta);
+    assert!(off(&fit.theta) < 0.02 && off(&fit.theta) < 0.4 * off(&ls.theta), "{:?} {:?}", fit.theta, ls.theta);
+    assert!((error.rmse - 0.1).abs() < 0.005, "{}", error.rmse);
     // The standard errors cover the truth.
     let se = trainer.standard_errors(&fit, &all(n)).unwrap();
     for ((t, b), s) in fit.theta.iter().zip(truth).zip(se) {
-        assert!((t - b).abs() < 4.0 * s && s < 0.01, "{t} {b} {s}");
+        assert!((t - b).abs() < 4.0 * s && s < 0.05, "{t} {b} {s}");
     }
 }
 

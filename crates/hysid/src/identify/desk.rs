@@ -47,7 +47,10 @@ impl<'a> Desk<'a> {
         decimation: usize,
     ) -> Result<Self, IdentifyError> {
         let samples: Vec<Samples> = all.iter().map(|s| s.every(decimation)).collect();
-        let y = spread(samples.iter().flat_map(|s| &s.y)).ok_or(IdentifyError::Nothing("sample of the output"))?;
+        let y = spread(samples.iter().flat_map(|s| &s.y)).ok_or_else(|| IdentifyError::TooShort {
+            samples: samples.iter().map(|s| s.y.len()).max().unwrap_or(0),
+            needed: 3,
+        })?;
         let inputs: Vec<&str> = source.inputs.iter().map(String::as_str).collect();
         let mut signals = Signals::from_columns(source.output, &inputs)?;
         for i in 0..inputs.len() {

@@ -23,6 +23,8 @@ pub(crate) struct Budget {
     pub patience: usize,
     /// Refinement steps after each term.
     pub steps: usize,
+    /// Terms that may be exchanged for better ones at the end.
+    pub exchanges: usize,
 }
 
 /// A term whose loss would raise the squared error by less than this share goes.
@@ -108,7 +110,54 @@ pub(crate) fn grow(
         }
         stages.push(next);
     }
+    exchange(trainer, family, &mut stages, search, hold, budget, refine)?;
     Ok(stages)
+}
+
+/// Terms that the path took early may be needed least at its end.
+const GIVE_BACK: usize = 3;
+/// An exchange must lower the error by this share.
+const BETTER: f64 = 0.003;
+
+/// Gives back one of the terms that the last model needs least and takes the best other one, as long as that helps.
+fn exchange(
+    trainer: &mut Trainer,
+    family: &Family,
+    stages: &mut Vec<Stage>,
+    search: &[Window],
+    hold: &[Window],
+    budget: Budget,
+    refine: Refine,
+) -> Result<(), NarxError> {
+    for _ in 0..budget.exchanges {
+        let Some(current) = stages.last().cloned() else { return Ok(()) };
+        let need = trainer.need_of_terms(&current.fit, search)?;
+        let mut order: Vec<usize> = (0..need.len()).collect();
+        order.sort_by(|a, b| need[*a].total_cmp(&need[*b]));
+        let mut better = None;
+        for k in order.into_iter().take(GIVE_BACK) {
+            let mut fit = current.fit.clone();
+            let given_back = fit.terms.remove(k);
+            fit.theta.remove(k);
+            let (fit, taught) = trainer.refine(fit, search, budget.steps, refine)?;
+            if !taught.rmse.is_finite() {
+                continue;
+            }
+            let shorter = Stage { fit, taught, held: current.held };
+            let others = Family {
+                candidates: family.candidates.iter().filter(|t| **t != given_back).cloned().collect(),
+                ..family.clone()
+            };
+            let next = one_more(trainer, &others, &shorter, search, hold, budget, refine, Evaluate::FreeRun)?;
+            if let Some(next) = next.filter(|n| n.taught.rmse < (1.0 - BETTER) * current.taught.rmse) {
+                better = Some(next);
+                break;
+            }
+        }
+        let Some(next) = better else { return Ok(()) };
+        stages.push(next);
+    }
+    Ok(())
 }
 
 #[expect(clippy::too_many_arguments, reason = "one step of `grow`, which holds them all")]

@@ -55,6 +55,10 @@ const LOOKS: [usize; 2] = [4000, 9000];
 const FIRST_TERMS: usize = 8;
 /// Families that grow on.
 const KEPT: usize = 3;
+/// One more is kept: the one with the shortest memory of those whose score is within this share of the best.
+const SHORT_AND_NEAR: f64 = 0.15;
+/// Terms that may be exchanged at the end of a path.
+const EXCHANGES: usize = 8;
 /// Terms of a model whose number nobody has decided: at most this, or the linear terms and half as many again.
 const MOST_TERMS: usize = 25;
 /// The shortest model whose score is within this share of the lowest is taken.
@@ -175,7 +179,14 @@ fn compete<'a>(mut desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>,
             r.score
         ));
     }
-    runners.truncate(KEPT);
+    let near = runners.first().map_or(0.0, |r| (1.0 + SHORT_AND_NEAR) * r.score);
+    let short = (0..runners.len()).filter(|&i| runners[i].score <= near).min_by_key(|&i| runners[i].memory());
+    if let Some(i) = short.filter(|&i| i >= KEPT) {
+        runners.swap(i, KEPT);
+        runners.truncate(KEPT + 1);
+    } else {
+        runners.truncate(KEPT);
+    }
     let grown = runners
         .into_par_iter()
         .map(|r| second_round(&desk, r, progress))
@@ -223,7 +234,7 @@ fn first_round(
         None => start(&mut trainer, &family, &s.search, &s.hold)?,
     };
     let Some(stage) = stage else { return Ok(None) };
-    let budget = Budget { terms: stage.fit.terms.len() + FIRST_TERMS, patience: FIRST_TERMS, steps: 4 };
+    let budget = Budget { terms: stage.fit.terms.len() + FIRST_TERMS, patience: FIRST_TERMS, steps: 4, exchanges: 0 };
     let path = grow(&mut trainer, &family, stage, &s.search, &s.hold, budget, Refine::Coefficients)?;
     let mut best: Option<(f64, Stage)> = None;
     for stage in path {
@@ -243,7 +254,7 @@ fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Resu
     let mut trainer = desk.trainer(&family.derived, family.given())?;
     let s = desk.split(&trainer, LOOKS[1])?;
     let most = desk.options.terms.unwrap_or(MOST_TERMS.max(family.linear.len() + family.linear.len() / 2));
-    let budget = Budget { terms: most, patience: 6, steps: 6 };
+    let budget = Budget { terms: most, patience: 6, steps: 6, exchanges: EXCHANGES };
     let (fit, taught) = trainer.refine(stage.fit, &s.search, 10, movable(&family))?;
     let held = trainer.error(&fit, &s.hold)?;
     let first = Stage { fit, taught, held };
