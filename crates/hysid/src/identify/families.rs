@@ -14,6 +14,8 @@ const PRODUCT_LAGS: usize = 5;
 const REVERSAL_LAGS: usize = 3;
 /// Candidates of one family, at most.
 const MOST_CANDIDATES: usize = 560;
+/// Beside more linear terms than this only products of lags are tried.
+const MOST_LINEAR: usize = 60;
 /// Presliding lengths that are tried, as shares of the input's standard deviation.
 const PRESLIDING: [f64; 3] = [0.05, 0.2, 0.8];
 /// The degree where the user has not said.
@@ -72,6 +74,9 @@ fn of_lags(desk: &Desk<'_>, ny: usize, nu: usize) -> Vec<Family> {
         of_velocity.extend(reversal_atoms(Signal::Output, 1));
         of_velocity.extend(lag_atoms(inputs, 0, first..=nu.min(2)));
         out.push(make("velocity of the output", vec![], of_velocity));
+    }
+    if start.len() > MOST_LINEAR && options.factors == Factors::Auto {
+        return out;
     }
     let mut derived = Vec::new();
     let mut with: Vec<Atom> = Vec::new();

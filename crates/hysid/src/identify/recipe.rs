@@ -53,10 +53,12 @@ pub type Progress<'a> = &'a (dyn Fn(&str) + Sync);
 const LOOKS: [usize; 2] = [4000, 9000];
 /// Terms that a family grows by in the first round.
 const FIRST_TERMS: usize = 8;
-/// Families that grow on.
+/// Families that grow on, of different lags.
 const KEPT: usize = 3;
 /// One more is kept: the one with the shortest memory of those whose score is within this share of the best.
 const SHORT_AND_NEAR: f64 = 0.15;
+/// A family with more linear terms than this is grown with less care.
+const LARGE: usize = 60;
 /// Terms that may be exchanged at the end of a path.
 const EXCHANGES: usize = 8;
 /// Terms of a model whose number nobody has decided: at most this, or the linear terms and half as many again.
@@ -179,6 +181,9 @@ fn compete<'a>(mut desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>,
             r.score
         ));
     }
+    // Families of the same lags are near copies of each other: the best of each lags goes on.
+    let mut seen = std::collections::HashSet::new();
+    runners.retain(|r| seen.insert((r.family.ny, r.family.nu)));
     let near = runners.first().map_or(0.0, |r| (1.0 + SHORT_AND_NEAR) * r.score);
     let short = (0..runners.len()).filter(|&i| runners[i].score <= near).min_by_key(|&i| runners[i].memory());
     if let Some(i) = short.filter(|&i| i >= KEPT) {
@@ -254,7 +259,9 @@ fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Resu
     let mut trainer = desk.trainer(&family.derived, family.given())?;
     let s = desk.split(&trainer, LOOKS[1])?;
     let most = desk.options.terms.unwrap_or(MOST_TERMS.max(family.linear.len() + family.linear.len() / 2));
-    let budget = Budget { terms: most, patience: 6, steps: 6, exchanges: EXCHANGES };
+    // With very many terms every step is dear, and few of them matter.
+    let (steps, exchanges) = if family.linear.len() > LARGE { (3, 0) } else { (6, EXCHANGES) };
+    let budget = Budget { terms: most, patience: 6, steps, exchanges };
     let (fit, taught) = trainer.refine(stage.fit, &s.search, 10, movable(&family))?;
     let held = trainer.error(&fit, &s.hold)?;
     let first = Stage { fit, taught, held };
