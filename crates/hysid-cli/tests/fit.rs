@@ -79,6 +79,49 @@ fn a_fit_is_written_and_predicts_every_row() {
 }
 
 #[test]
+fn every_decision_can_be_taken_from_it() {
+    let dir = files();
+    let (est, out) = (path(dir.path(), "est.csv"), path(dir.path(), "out"));
+    let fit = |more: &[&str]| -> serde_json::Value {
+        let mut args = vec!["fit", "--recording", &est, "--input", "u_V", "--output", "y_mm", "--out", &out, "--json"];
+        args.extend(more);
+        let done = hysid(&args);
+        assert!(done.status.success(), "{more:?}: {}", String::from_utf8_lossy(&done.stderr));
+        serde_json::from_slice(&done.stdout).unwrap()
+    };
+    let degree = |s: &serde_json::Value| {
+        let of = |t: &str| {
+            t.split('*').map(|f| f.split_once('^').map_or(1, |p| p.1.parse::<usize>().unwrap())).sum::<usize>()
+        };
+        s["terms"].as_array().unwrap().iter().map(|t| of(t["term"].as_str().unwrap())).max().unwrap()
+    };
+    let s = fit(&["--degree", "1", "--factors", "polynomial"]);
+    assert_eq!(degree(&s), 1, "{}", s["equation"]);
+    let s = fit(&["--lags-output", "1", "--lags-input", "2", "--input-delay", "1", "--factors", "polynomial"]);
+    assert!(
+        s["lags"]["output"] == 1
+            && s["lags"]["input"].as_u64() <= Some(2)
+            && s["lags"]["input_delay"].as_u64() >= Some(1),
+        "{}",
+        s["lags"]
+    );
+    assert_eq!(fit(&["--decimate", "2"])["decimation"], 2);
+    assert_eq!(fit(&["--decimate", "none"])["decimation"], 1);
+    assert!(fit(&["--terms", "6", "--lags-output", "2", "--lags-input", "1"])["terms"].as_array().unwrap().len() <= 6);
+    for criterion in ["press", "bic", "aic", "err:0.01"] {
+        let s = fit(&["--criterion", criterion, "--factors", "polynomial", "--lags-output", "2", "--lags-input", "2"]);
+        assert!(s["diverged_at"].is_null(), "{criterion}");
+        assert!(
+            s["decisions"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .any(|d| d.as_str().unwrap().contains("one-step regression decided"))
+        );
+    }
+}
+
+#[test]
 fn bad_input_ends_with_status_2_one_message_and_no_file() {
     let dir = files();
     let (est, short, empty, out) = (
@@ -113,7 +156,7 @@ fn bad_input_ends_with_status_2_one_message_and_no_file() {
         (own(&["--recording", &est, "--input", "u_V", "--output", "u_V"]), "twice"),
         (own(&["--recording", &est, "--input", "u_V", "--output", "still"]), "still"),
         (own(&["--recording", &est, "--input", "still", "--output", "y_mm"]), "constant"),
-        (own(&["--recording", &est, "--input", "late", "--output", "y_mm"]), "late"),
+        (own(&["--recording", &est, "--input", "late", "--output", "y_mm"]), "samples"),
         (own(&["--recording", &short, "--input", "u_V", "--output", "y_mm"]), "samples"),
         (own(&["--recording", &empty, "--input", "u_V", "--output", "y_mm"]), "empty.csv"),
         (own(&["--recording", "nowhere.csv", "--input", "u_V", "--output", "y_mm"]), "nowhere.csv"),

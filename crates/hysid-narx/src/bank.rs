@@ -93,6 +93,11 @@ impl Bank {
         self.columns.get(&quantity).map(Vec::as_slice)
     }
 
+    /// The inputs, recorded and derived, in order; 0 outside the gap-free stretches.
+    pub fn inputs(&self) -> Vec<&[f64]> {
+        (0..).map_while(|i| self.column(Quantity::Value(Signal::Input(i)))).collect()
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.y.len()

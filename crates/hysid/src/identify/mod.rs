@@ -11,6 +11,7 @@
 //! 4. It is refined on all estimation samples, and checked: does it still run, does it stay, how far does it hold.
 
 mod blocks;
+mod criterion;
 mod data;
 mod desk;
 mod families;

@@ -5,6 +5,7 @@ use hysid_signal::Recording;
 use rayon::prelude::*;
 
 use super::blocks::best_block;
+use super::criterion::by_criterion;
 use super::data::{Samples, gather};
 use super::desk::Desk;
 use super::families::families;
@@ -217,6 +218,16 @@ fn compete<'a>(mut desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>,
         let score = linear.stage.held.rmse;
         (Runner { family: linear.family.clone(), stage: linear.stage.clone(), score }, Vec::new())
     });
+    let mut runner = runner;
+    if let Some(stage) = by_criterion(&desk, &runner.family, &runner.stage.fit.derived)? {
+        decisions.push(format!(
+            "{:?} of one-step regression decided on {} terms: held-out free run {:.4e}",
+            desk.options.criterion,
+            stage.fit.terms.len(),
+            stage.held.rmse
+        ));
+        runner.stage = stage;
+    }
     Ok(Winner { desk, family: runner.family, stage: runner.stage, score: runner.score, linear, decisions, path })
 }
 
@@ -257,11 +268,12 @@ fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Resu
     let Runner { family, stage, .. } = runner;
     progress(&format!("growing {}", family.name));
     let mut trainer = desk.trainer(&family.derived, family.given())?;
-    let s = desk.split(&trainer, LOOKS[1])?;
+    let large = family.linear.len() > LARGE;
+    let s = desk.split(&trainer, if large { LOOKS[0] } else { LOOKS[1] })?;
     let most = desk.options.terms.unwrap_or(MOST_TERMS.max(family.linear.len() + family.linear.len() / 2));
     // With very many terms every step is dear, and few of them matter.
-    let (steps, exchanges) = if family.linear.len() > LARGE { (3, 0) } else { (6, EXCHANGES) };
-    let budget = Budget { terms: most, patience: 6, steps, exchanges };
+    let (patience, steps, exchanges) = if large { (3, 3, 0) } else { (6, 6, EXCHANGES) };
+    let budget = Budget { terms: most, patience, steps, exchanges };
     let (fit, taught) = trainer.refine(stage.fit, &s.search, 10, movable(&family))?;
     let held = trainer.error(&fit, &s.hold)?;
     let first = Stage { fit, taught, held };
