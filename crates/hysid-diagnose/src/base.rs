@@ -10,6 +10,16 @@ use crate::refit::{Fit, LmOptions, Problem, levenberg_marquardt};
 /// Largest order of the noise models.
 pub const MAX_AR: usize = 16;
 
+/// How the noise of a fit is modelled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoiseKind {
+    /// An autoregression: what is left is noise, whatever its colour.
+    Coloured,
+    /// White, each sample counting for this share of one: what is left is mostly mismatch, whose colour says nothing of the noise. An
+    /// autoregression would explain a slow mismatch by its own past.
+    White(f64),
+}
+
 /// A simulation fitted to a data set under a noise model of its own.
 #[derive(Debug)]
 pub struct Base<'d> {
@@ -32,22 +42,27 @@ pub fn fit_simulation<'d>(
     whitener: Option<&Whitener>,
     rounds: usize,
     options: LmOptions,
+    kind: NoiseKind,
 ) -> Option<Base<'d>> {
     let data = model.data();
     let mut theta = model.theta(start);
+    let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
     let mut noise = match whitener {
-        Some(w) => w.clone(),
-        None => data.layout.fit_noise(&data.y, 0),
+        Some(w) if kind == NoiseKind::Coloured || w.order() == 0 => w.clone(),
+        _ => data.layout.fit_noise(&data.y, 0),
     };
     let mut fit = None;
     for _ in 0..rounds.max(1) {
         let f = levenberg_marquardt(&model, &theta, &data.layout, &noise, None, options)?;
         theta.clone_from(&f.theta);
-        noise = data.layout.fit_noise(&f.residual, MAX_AR);
+        noise = data.layout.fit_noise(&f.residual, order);
         fit = Some(f);
     }
     let fit = fit?;
-    let log_likelihood = log_likelihood(data, &noise, &fit.residual);
+    let mut log_likelihood = log_likelihood(data, &noise, &fit.residual);
+    if let NoiseKind::White(share) = kind {
+        log_likelihood *= share;
+    }
     Some(Base { model, fit, whitener: noise, log_likelihood })
 }
 

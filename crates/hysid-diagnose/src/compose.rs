@@ -7,7 +7,7 @@
 use hysid_plant::Simulation;
 use rayon::prelude::*;
 
-use crate::base::{Base, fit_simulation};
+use crate::base::{Base, NoiseKind, fit_simulation};
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Rewritten};
@@ -87,6 +87,8 @@ pub struct Setting<'d> {
     pub own_unknowns: usize,
     /// Iterations of a refit on the short list.
     pub iterations: usize,
+    /// How noise is modelled.
+    pub noise: NoiseKind,
 }
 
 impl<'d> Setting<'d> {
@@ -100,7 +102,7 @@ impl<'d> Setting<'d> {
         iterations: usize,
     ) -> Option<Base<'d>> {
         let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
-        fit_simulation(model, start, noise, rounds, LmOptions { iterations, ..LmOptions::default() })
+        fit_simulation(model, start, noise, rounds, LmOptions { iterations, ..LmOptions::default() }, self.noise)
     }
 
     /// The evidence of a fitted document.

@@ -46,7 +46,7 @@ impl Stretch {
 /// All estimation (or all hold-out) data.
 #[derive(Debug, Clone)]
 pub struct DataSet {
-    /// Sampling period, in seconds.
+    /// Sampling period of the first recording, in seconds.
     pub period_s: f64,
     /// Names of the recordings.
     pub recordings: Vec<String>,
@@ -82,14 +82,10 @@ impl DataSet {
         let mut notes = Vec::new();
         let states = simulation.states.len();
         for (index, r) in recordings.iter().enumerate() {
-            let found = r.clock().period_s;
-            if (found - period_s).abs() > 1e-4 * period_s {
-                return Err(DiagnoseError::OtherPeriod {
-                    recording: r.name().to_owned(),
-                    found,
-                    first: if declared.is_some() { "the simulation file".to_owned() } else { first.name().to_owned() },
-                    expected: period_s,
-                });
+            // Each recording keeps its own clock; what is told in seconds or hertz for all of them goes by the first.
+            let own_period_s = declared.unwrap_or(r.clock().period_s);
+            if (own_period_s - period_s).abs() > 1e-4 * period_s && !notes.iter().any(|n: &String| n.starts_with("the recordings have")) {
+                notes.push("the recordings have different sampling periods; frequencies are told for that of the first".into());
             }
             let column = |name: &str| {
                 r.channel(name).map(|c| c.samples.as_slice()).ok_or_else(|| DiagnoseError::MissingColumn {
@@ -131,12 +127,12 @@ impl DataSet {
                     dropped += range.len();
                     continue;
                 }
-                let start_s = r.clock().start_s + period_s * range.start as f64;
+                let start_s = r.clock().start_s + own_period_s * range.start as f64;
                 let inputs = u.iter().map(|c| c[range.clone()].to_vec()).collect();
                 stretches.push(Stretch {
                     recording: index,
                     start_s,
-                    drive: Drive::new(start_s, period_s, range.len(), inputs)
+                    drive: Drive::new(start_s, own_period_s, range.len(), inputs)
                         .map_err(|e| DiagnoseError::Simulation { file: r.name().to_owned(), problem: e.to_string() })?,
                     outputs: y.iter().map(|c| c[range.clone()].to_vec()).collect(),
                     samples: range,
@@ -215,7 +211,8 @@ impl DataSet {
     pub fn time_of_rows(&self, series: &Series) -> impl Iterator<Item = f64> + '_ {
         let start = self.stretches[series.stretch].start_s;
         let first = series.first;
-        (0..series.rows.len()).map(move |n| start + (first + n) as f64 * self.period_s)
+        let period_s = self.stretches[series.stretch].drive.period_s();
+        (0..series.rows.len()).map(move |n| start + (first + n) as f64 * period_s)
     }
 
     /// A data set of at most about `limit` samples: windows of equal length, the first and the last at the ends of the data and the loudest
@@ -256,10 +253,10 @@ impl DataSet {
             starts.dedup_by(|b, a| *b < *a + length);
             for start in starts {
                 let range = start..start + length;
-                let start_s = s.start_s + start as f64 * self.period_s;
+                let start_s = s.start_s + start as f64 * s.drive.period_s();
                 let inputs = s.drive.inputs().iter().map(|c| c[range.clone()].to_vec()).collect();
                 // The parts of a good drive are a good drive.
-                let Ok(drive) = Drive::new(start_s, self.period_s, length, inputs) else { continue };
+                let Ok(drive) = Drive::new(start_s, s.drive.period_s(), length, inputs) else { continue };
                 chosen.push(Stretch {
                     recording: s.recording,
                     samples: s.samples.start + start..s.samples.start + start + length,

@@ -41,20 +41,6 @@ pub enum DiagnoseError {
         /// Its value.
         value: f64,
     },
-    /// Two recordings with different sampling periods.
-    #[error(
-        "{recording}: its sampling period is {found} s, that of {first} is {expected} s; one diagnosis needs one sampling period"
-    )]
-    OtherPeriod {
-        /// The recording.
-        recording: String,
-        /// Its period.
-        found: f64,
-        /// The first recording.
-        first: String,
-        /// Its period.
-        expected: f64,
-    },
     /// The same file as estimation and hold-out.
     #[error("{0}: given as --recording and as --holdout; the hold-out must be data that the estimation never sees")]
     SameData(String),

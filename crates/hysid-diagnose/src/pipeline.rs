@@ -7,7 +7,7 @@ use hysid_plant::Simulation;
 use hysid_signal::Recording;
 use rayon::prelude::*;
 
-use crate::base::Base;
+use crate::base::{Base, NoiseKind};
 use crate::bootstrap::{ratio_of_rms, rms};
 use crate::compose::{
     Hypothesis, Key, SearchOptions, Setting, add, best_of, block_score, compose, refit_all, short_list,
@@ -15,7 +15,7 @@ use crate::compose::{
 use crate::data::{DataSet, held_out_blocks};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
-use crate::evidence::{FeatureGroup, SurrogateTest, TestOptions, detectable_amplitude, surrogate_test};
+use crate::evidence::{FeatureGroup, correlation_time, SurrogateTest, TestOptions, detectable_amplitude, norm2, surrogate_test};
 use crate::experiment::{present_separation, propose};
 use crate::file::*;
 use crate::hold::{FreeRun, free_run};
@@ -27,7 +27,7 @@ use crate::picture::Picture;
 use crate::report_values::{reported, sentence};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
-use crate::verdict::{Claim, Hypothesis as Weighed, probabilities, supports, verdict};
+use crate::verdict::{Support, Claim, Hypothesis as Weighed, probabilities, supports, verdict};
 
 /// Options of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,15 +136,15 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     (hooks.progress)("calibrating the simulation");
     let own_states: Vec<String> = simulation.states.iter().map(|s| s.name.clone()).collect();
     let mut setting =
-        Setting { data: &data, original: simulation.clone(), own_states, substeps: 2, own_unknowns: 0, iterations: 12 };
+        Setting { data: &data, original: simulation.clone(), own_states, substeps: 2, own_unknowns: 0, iterations: 12, noise: NoiseKind::Coloured };
     let base = calibrate(&mut setting, request)?;
     setting.own_unknowns = base.model.unknowns().len();
     let log_evidence = setting.evidence(&base);
-    let none = Hypothesis { effects: Vec::new(), base, log_evidence };
+    let mut none = Hypothesis { effects: Vec::new(), base, log_evidence };
 
     (hooks.progress)("looking for what could be missing");
     let evidence = none.base.evidence();
-    let candidates = screen(&none.base, simulation, &evidence, &|_, _| true);
+    let mut candidates = screen(&none.base, simulation, &evidence, &|_, _| true);
     let test = test_of(&candidates, &none.base, &evidence, options);
     let baseline = none.base.document();
     let residual_rms = by_column(simulation, &data.layout.rms(&none.base.fit.residual));
@@ -174,17 +174,27 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let mut pool: Vec<Hypothesis<'_>> = Vec::new();
     let significant = test.p_value < options.alpha;
     if significant {
-        (hooks.progress)("refitting the likeliest effects");
-        let list = short_list(&candidates, 10);
-        for h in refit_all(&setting, &none, &list) {
-            add(&mut pool, h);
+        search(&setting, &none, &candidates, &mut pool, simulation, options, &tests, hooks);
+    }
+    if significant && !(hooks.expired)() && absorbed(&none, &pool) {
+        // An autoregression explains a slow mismatch by its own past: then the mismatch is no noise, and the plain sum of squares decides,
+        // with as many samples as are independent.
+        let tau = correlation_time(&data.layout, &none.base.fit.residual);
+        setting.noise = NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64));
+        if let Some(base) = setting.fit(simulation, &none.base.values(), None, 2, 20) {
+            let log_evidence = setting.evidence(&base);
+            let plain = Hypothesis { effects: Vec::new(), base, log_evidence };
+            let evidence = plain.base.evidence();
+            let again = screen(&plain.base, simulation, &evidence, &|_, _| true);
+            let mut other = Vec::new();
+            search(&setting, &plain, &again, &mut other, simulation, options, &tests, hooks);
+            let gained = best_of(&other).is_some_and(|b| other[b].log_evidence > plain.log_evidence + PRICE_OF_AN_EFFECT);
+            if gained {
+                (none, candidates, pool) = (plain, again, other);
+            } else {
+                setting.noise = NoiseKind::Coloured;
+            }
         }
-        if let Some(h) = crate::numerics_check::artefact(&setting, &none) {
-            add(&mut pool, h);
-        }
-        (hooks.progress)("looking for a second and third effect");
-        let unexplained = |h: &Hypothesis<'_>| remains(h, simulation, options, &tests).p_value < STOP_LEVEL;
-        compose(&setting, &none, &mut pool, SearchOptions { depth: 3, beam: 2, most: 6 }, &unexplained, hooks.expired);
     }
     pool.insert(0, none);
 
@@ -197,7 +207,17 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let log = log_weights(&pool, &blocks, winner, if imperfect { IMPERFECT_WEIGHT } else { EVIDENCE_WEIGHT });
     let probability = probabilities(&log, 1.0);
     let claims = weighed[winner].claims.clone();
-    let support = supports(&claims, &weighed, &probability);
+    let mut support = supports(&claims, &weighed, &probability);
+    if imperfect {
+        // What is left shows that the set is not the truth: later members may stand in for something else, and none of them is firm.
+        support.iter_mut().skip(1).for_each(Support::weaken);
+    }
+    // Two members of one family in one set: something of that kind, but neither of them as it stands.
+    for i in 0..claims.len() {
+        if claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family) {
+            support[i].weaken();
+        }
+    }
     file.verdict = verdict(&support);
     let best = &pool[winner];
     file.effects = best
@@ -331,6 +351,43 @@ fn split_blocks(all: &DataSet) -> (DataSet, DataSet) {
         }
     }
     (all.keep(|s, n, _| !out.contains(&(s, n))), all.keep(|s, n, _| out.contains(&(s, n))))
+}
+
+/// Whether the noise model has absorbed the mismatch: nothing was found under it, or what was found leaves the error as large as it was
+/// while the residual is far larger than its innovations.
+fn absorbed(none: &Hypothesis<'_>, pool: &[Hypothesis<'_>]) -> bool {
+    let Some(best) = best_of(pool) else { return true };
+    if pool[best].log_evidence < none.log_evidence + PRICE_OF_AN_EFFECT {
+        return true;
+    }
+    let left = (norm2(&pool[best].base.fit.residual) / norm2(&none.base.fit.residual).max(f64::MIN_POSITIVE)).sqrt();
+    let coloured = none.base.whitener.models.iter().any(|m| m.noise_rms() > 15.0 * m.innovation());
+    left > 0.7 && coloured
+}
+
+/// Refits the short list, compares the numerics, and composes.
+#[allow(clippy::too_many_arguments)]
+fn search<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    candidates: &[Candidate],
+    pool: &mut Vec<Hypothesis<'d>>,
+    simulation: &Simulation,
+    options: Options,
+    tests: &Tests,
+    hooks: &Hooks<'_>,
+) {
+    (hooks.progress)("refitting the likeliest effects");
+    let list = short_list(candidates, 10);
+    for h in refit_all(setting, none, &list) {
+        add(pool, h);
+    }
+    if let Some(h) = crate::numerics_check::artefact(setting, none) {
+        add(pool, h);
+    }
+    (hooks.progress)("looking for a second and third effect");
+    let unexplained = |h: &Hypothesis<'_>| remains(h, simulation, options, tests).p_value < STOP_LEVEL;
+    compose(setting, none, pool, SearchOptions { depth: 3, beam: 2, most: 6 }, &unexplained, hooks.expired);
 }
 
 /// Tests of what remains, by statement: composition and the verdict ask for the same ones.

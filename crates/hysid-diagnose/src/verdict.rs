@@ -9,6 +9,9 @@ use crate::file::VerdictKind;
 /// The probability from which a statement is firm.
 pub const FIRM: f64 = 0.9;
 
+/// The largest probability of an effect that the set around it makes doubtful.
+pub const NOT_FIRM: f64 = 0.85;
+
 /// An effect as the verdict sees it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Claim {
@@ -50,6 +53,14 @@ pub struct Support {
     pub family: f64,
     /// Probability of the slot, by whatever mechanism.
     pub slot: f64,
+}
+
+impl Support {
+    /// No longer firm: something shows that the set is not the whole truth.
+    pub fn weaken(&mut self) {
+        self.mechanism = self.mechanism.min(NOT_FIRM);
+        self.family = self.family.min(NOT_FIRM);
+    }
 }
 
 /// The support that each claim of `best` finds among all hypotheses.
