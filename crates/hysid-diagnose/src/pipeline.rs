@@ -27,7 +27,7 @@ use crate::picture::Picture;
 use crate::report_values::{reported, sentence};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
-use crate::verdict::{Support, Claim, Hypothesis as Weighed, probabilities, supports, verdict};
+use crate::verdict::{FIRM, Support, Claim, Hypothesis as Weighed, probabilities, supports, verdict};
 
 /// Options of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -289,7 +289,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
                 && open.block_ratio < BETTER
             {
                 // An effect that is really there is still named; what most of the mismatch is decides the verdict.
-                if share > 0.5 || file.verdict == VerdictKind::Ambiguous {
+                if share > 0.5 || (share > 0.2 && support.iter().all(|s| s.family < FIRM)) {
                     file.verdict = VerdictKind::NotInCatalogue;
                 }
                 file.correction = Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record });
@@ -307,6 +307,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());
     file.calibrated_parameters = calibrated(&best.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
+    for e in &best.effects {
+        let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label);
+        if let Some(lacking) = candidate.and_then(|c| c.lacking.as_ref()) {
+            file.notes.push(format!("{}: for a firmer answer the recording lacks something: {lacking}", e.mechanism.id));
+        }
+    }
     file.summary = summary(&file);
     let noise: Vec<f64> = simulation.outputs.iter().map(|o| file.mismatch.noise_rms[&o.column]).collect();
     let picture = picture(&Sitting {
