@@ -84,8 +84,12 @@ impl DataSet {
         for (index, r) in recordings.iter().enumerate() {
             // Each recording keeps its own clock; what is told in seconds or hertz for all of them goes by the first.
             let own_period_s = declared.unwrap_or(r.clock().period_s);
-            if (own_period_s - period_s).abs() > 1e-4 * period_s && !notes.iter().any(|n: &String| n.starts_with("the recordings have")) {
-                notes.push("the recordings have different sampling periods; frequencies are told for that of the first".into());
+            if (own_period_s - period_s).abs() > 1e-4 * period_s
+                && !notes.iter().any(|n: &String| n.starts_with("the recordings have"))
+            {
+                notes.push(
+                    "the recordings have different sampling periods; frequencies are told for that of the first".into(),
+                );
             }
             let column = |name: &str| {
                 r.channel(name).map(|c| c.samples.as_slice()).ok_or_else(|| DiagnoseError::MissingColumn {

@@ -15,7 +15,9 @@ use crate::compose::{
 use crate::data::{DataSet, held_out_blocks};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
-use crate::evidence::{FeatureGroup, correlation_time, SurrogateTest, TestOptions, detectable_amplitude, norm2, surrogate_test};
+use crate::evidence::{
+    FeatureGroup, SurrogateTest, TestOptions, correlation_time, detectable_amplitude, norm2, surrogate_test,
+};
 use crate::experiment::{present_separation, propose};
 use crate::file::*;
 use crate::hold::{FreeRun, free_run};
@@ -27,7 +29,7 @@ use crate::picture::Picture;
 use crate::report_values::{reported, sentence};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
-use crate::verdict::{FIRM, Support, Claim, Hypothesis as Weighed, probabilities, supports, verdict};
+use crate::verdict::{Claim, FIRM, Hypothesis as Weighed, Support, probabilities, supports, verdict};
 
 /// Options of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,8 +137,15 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("calibrating the simulation");
     let own_states: Vec<String> = simulation.states.iter().map(|s| s.name.clone()).collect();
-    let mut setting =
-        Setting { data: &data, original: simulation.clone(), own_states, substeps: 2, own_unknowns: 0, iterations: 12, noise: NoiseKind::Coloured };
+    let mut setting = Setting {
+        data: &data,
+        original: simulation.clone(),
+        own_states,
+        substeps: 2,
+        own_unknowns: 0,
+        iterations: 12,
+        noise: NoiseKind::Coloured,
+    };
     let base = calibrate(&mut setting, request)?;
     setting.own_unknowns = base.model.unknowns().len();
     let log_evidence = setting.evidence(&base);
@@ -188,7 +197,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             let again = screen(&plain.base, simulation, &evidence, &|_, _| true);
             let mut other = Vec::new();
             search(&setting, &plain, &again, &mut other, simulation, options, &tests, hooks);
-            let gained = best_of(&other).is_some_and(|b| other[b].log_evidence > plain.log_evidence + PRICE_OF_AN_EFFECT);
+            let gained =
+                best_of(&other).is_some_and(|b| other[b].log_evidence > plain.log_evidence + PRICE_OF_AN_EFFECT);
             if gained {
                 (none, candidates, pool) = (plain, again, other);
             } else {
@@ -310,7 +320,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     for e in &best.effects {
         let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label);
         if let Some(lacking) = candidate.and_then(|c| c.lacking.as_ref()) {
-            file.notes.push(format!("{}: for a firmer answer the recording lacks something: {lacking}", e.mechanism.id));
+            file.notes
+                .push(format!("{}: for a firmer answer the recording lacks something: {lacking}", e.mechanism.id));
         }
     }
     file.summary = summary(&file);
