@@ -1,7 +1,7 @@
 //! `cargo xtask recordings`: identifies every public recording set with defaults and prints what the free run is worth.
 //!
-//! Each set is used by its own split into estimation and validation; nothing is chosen on the validation data and nothing is
-//! tuned for a set. Beside ours stands the linear model that is identified and refined the same way, and the figure that the
+//! Each set is used by its own split into estimation and validation; a run sees no validation data and has no setting for a set.
+//! (What the recipe's rules owe to these figures is told in `docs/recordings.md`.) Beside ours stands the linear model that is identified and refined the same way, and the figure that the
 //! set's `meta.json` quotes. Without the recordings the task says so and succeeds, unless `HYSID_REQUIRE_RECORDINGS=1`.
 
 mod page;
