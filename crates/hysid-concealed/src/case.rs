@@ -177,6 +177,9 @@ impl Case {
         } else {
             tune(&design, &source, &units, dnr, noise_level, &seen)?
         };
+        if machine_is_silenced(&tuned) {
+            return None;
+        }
         let bits = 12 + random.below(5) as u32;
         let headroom = random.uniform(1.1, 2.0);
         let machine = tuned.machine.clone();
@@ -245,6 +248,23 @@ impl Case {
         };
         Some(Self { label, design, machine, est, val, louder, simulation, clock })
     }
+}
+
+/// A limit that leaves little of the signal is not a concealed effect but a broken channel.
+fn machine_is_silenced(tuned: &Tuned) -> bool {
+    let command = match &tuned.input {
+        Input::Held { values, .. } => values.as_slice(),
+        Input::Motion { .. } => &[],
+    };
+    tuned.machine.effects.iter().any(|e| {
+        let signal = match e.law {
+            Law::OutputSaturation => tuned.y[0].as_slice(),
+            Law::InputSaturation => command,
+            _ => return false,
+        };
+        let limited = signal.iter().filter(|v| v.abs() >= e.p[0]).count();
+        limited > signal.len() / 3
+    })
 }
 
 fn rates(x: &[f64], period: f64) -> Vec<f64> {

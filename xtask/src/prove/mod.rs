@@ -18,15 +18,15 @@ mod stats;
 mod trial;
 mod verdict;
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, ensure};
 use hysid_concealed::bank;
 use hysid_concealed::seed::Stream;
-use rayon::prelude::*;
-
 use score::{Row, Score};
 use trial::Bench;
 
@@ -42,6 +42,9 @@ pub struct Args {
     /// Leave out cases with more samples than this [default: no limit; 2000 with --quick]
     #[arg(long)]
     longest: Option<usize>,
+    /// Begin no further case after this many minutes
+    #[arg(long)]
+    minutes: Option<u64>,
     /// First case of the bank to run
     #[arg(long, default_value_t = 0)]
     first: usize,
@@ -88,12 +91,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let root = std::env::temp_dir().join(format!("hysid-prove-{}", std::process::id()));
     let bench = Bench { binary, root: root.clone(), time_limit: Duration::from_secs(args.time_limit) };
     let longest = args.longest.unwrap_or(if args.quick { 2000 } else { usize::MAX });
-    let rows = trials(&bench, stream, args.seed, range, longest);
+    let rows =
+        trials(&bench, stream, args.seed, range, longest, args.minutes.map(|m| start + Duration::from_secs(60 * m)));
     let _ = std::fs::remove_dir_all(&root);
     let rows = rows?;
     let score = score::score(&rows);
     let took = start.elapsed().as_secs_f64();
-    let command = command(args, count);
+    let command = command(args, if args.minutes.is_some() { rows.len() } else { count });
     let text = page::markdown(&score, &command, took, &rows);
     println!("{text}");
     let out = crate::root().join(&args.out);
@@ -112,38 +116,47 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Every case made, diagnosed and compared with its rivals, in the order of the bank.
+/// Every case made, diagnosed and compared with its rivals, in the order of the bank. After `deadline` no further case is begun, so
+/// that what is scored is the beginning of the bank and not a choice of quick cases.
 fn trials(
     bench: &Bench,
     stream: Stream,
     seed: u64,
-    range: std::ops::Range<usize>,
+    range: Range<usize>,
     longest: usize,
+    deadline: Option<Instant>,
 ) -> anyhow::Result<Vec<Row>> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(SIDE_BY_SIDE).build()?;
-    let total = range.len();
-    let done = std::sync::atomic::AtomicUsize::new(0);
-    pool.install(|| {
-        range
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|i| {
-                let case = bank::case(stream, seed, i);
-                if case.label.samples > longest {
-                    return Ok(None);
-                }
-                let trial = bench.run(&case)?;
-                let mut row = Row::new(&case, trial, rivals::rivals(bench, &case));
-                row.settled = bench.experiment(&case, &row)?;
-                let n = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-                if n.is_multiple_of(20) {
-                    eprintln!("{n} of {total}");
-                }
-                Ok(Some(row))
-            })
-            .collect::<anyhow::Result<Vec<_>>>()
-            .map(|rows| rows.into_iter().flatten().collect())
-    })
+    let next = AtomicUsize::new(range.start);
+    let worker = || -> anyhow::Result<Vec<(usize, Row)>> {
+        let mut rows = Vec::new();
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            if i >= range.end || deadline.is_some_and(|d| Instant::now() > d) {
+                return Ok(rows);
+            }
+            let case = bank::case(stream, seed, i);
+            if case.label.samples > longest {
+                continue;
+            }
+            let trial = bench.run(&case)?;
+            let mut row = Row::new(&case, trial, rivals::rivals(bench, &case));
+            row.settled = bench.experiment(&case, &row)?;
+            rows.push((i, row));
+            if (i + 1).is_multiple_of(20) {
+                eprintln!("{} of {}", i + 1 - range.start, range.len());
+            }
+        }
+    };
+    let mut rows = std::thread::scope(|scope| -> anyhow::Result<Vec<(usize, Row)>> {
+        let threads: Vec<_> = (0..SIDE_BY_SIDE).map(|_| scope.spawn(worker)).collect();
+        let mut rows = Vec::new();
+        for thread in threads {
+            rows.extend(thread.join().map_err(|_| anyhow::anyhow!("a worker panicked"))??);
+        }
+        Ok(rows)
+    })?;
+    rows.sort_by_key(|r| r.0);
+    Ok(rows.into_iter().map(|r| r.1).collect())
 }
 
 fn build() -> anyhow::Result<PathBuf> {
