@@ -1,7 +1,7 @@
 //! Whole diagnoses of an oscillator whose recordings come from a small integrator of this file's own, and bad input.
 
 use hysid_diagnose::file::VerdictKind;
-use hysid_diagnose::{Diagnosis, DiagnoseError, Hooks, Options, Request, diagnose};
+use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose};
 use hysid_plant::Simulation;
 use hysid_signal::{Channel, Clock, Recording};
 
@@ -66,7 +66,8 @@ fn recording(name: &str, seed: u64, n: usize, force: impl Fn(f64, f64) -> f64) -
 fn run(text: &str, estimation: &[Recording], holdout: &[Recording]) -> Result<Diagnosis, DiagnoseError> {
     let simulation = Simulation::parse(text, "test.sim.toml").unwrap();
     let hooks = Hooks { progress: &|_| {}, expired: &|| false };
-    let request = Request { simulation: &simulation, file: "test.sim.toml", estimation, holdout, options: Options::default() };
+    let request =
+        Request { simulation: &simulation, file: "test.sim.toml", estimation, holdout, options: Options::default() };
     diagnose(&request, &hooks)
 }
 
@@ -110,17 +111,39 @@ fn the_same_bytes_for_any_number_of_threads() {
 #[test]
 fn bad_input_is_refused_with_a_reason() {
     let good = || recording("est.csv", 1, 300, |_, _| 0.0);
-    let with = |channels: Vec<Channel>, period_s: f64| Recording::new("bad.csv", Clock { start_s: 0.0, period_s }, channels).unwrap();
+    let with = |channels: Vec<Channel>, period_s: f64| {
+        Recording::new("bad.csv", Clock { start_s: 0.0, period_s }, channels).unwrap()
+    };
     let channel = |name: &str, samples: Vec<f64>| Channel { name: name.into(), samples };
     let ramp: Vec<f64> = (0..300).map(f64::from).collect();
     let cases: Vec<(&str, Result<Diagnosis, DiagnoseError>, &str)> = vec![
         ("no recording", run(BASELINE, &[], &[good()]), "at least one"),
-        ("hold-out with other columns", run(BASELINE, &[good()], &[with(vec![channel("force_N", ramp.clone()), channel("x_m", ramp.clone())], 0.025)]), "no column `u_N`"),
-        ("empty hold-out", run(BASELINE, &[good()], &[with(vec![channel("u_N", vec![]), channel("x_m", vec![])], 0.025)]), "usable samples"),
-        ("constant output", run(BASELINE, &[with(vec![channel("u_N", ramp.clone()), channel("x_m", vec![1.0; 300])], 0.025)], &[]), "constant"),
+        (
+            "hold-out with other columns",
+            run(
+                BASELINE,
+                &[good()],
+                &[with(vec![channel("force_N", ramp.clone()), channel("x_m", ramp.clone())], 0.025)],
+            ),
+            "no column `u_N`",
+        ),
+        (
+            "empty hold-out",
+            run(BASELINE, &[good()], &[with(vec![channel("u_N", vec![]), channel("x_m", vec![])], 0.025)]),
+            "usable samples",
+        ),
+        (
+            "constant output",
+            run(BASELINE, &[with(vec![channel("u_N", ramp.clone()), channel("x_m", vec![1.0; 300])], 0.025)], &[]),
+            "constant",
+        ),
         ("the same data twice", run(BASELINE, &[good()], &[good()]), "never sees"),
         ("too few samples", run(BASELINE, &[recording("short.csv", 1, 12, |_, _| 0.0)], &[]), "at least"),
-        ("all inputs missing", run(BASELINE, &[with(vec![channel("u_N", vec![f64::NAN; 300]), channel("x_m", ramp.clone())], 0.025)], &[]), "usable samples"),
+        (
+            "all inputs missing",
+            run(BASELINE, &[with(vec![channel("u_N", vec![f64::NAN; 300]), channel("x_m", ramp.clone())], 0.025)], &[]),
+            "usable samples",
+        ),
         (
             "a state that explodes",
             run(&BASELINE.replace("(u - c*v - k*x)/m", "(u + 1e9*(c + sqrt(k*m))*v - k*x)/m"), &[good()], &[]),
