@@ -98,6 +98,11 @@ impl Bank {
         (0..).map_while(|i| self.column(Quantity::Value(Signal::Input(i)))).collect()
     }
 
+    /// The output and all inputs, recorded and derived, over the gap-free stretches, as a design matrix takes them.
+    pub fn record(&self) -> Record<'_> {
+        Record { y: &self.y, inputs: self.inputs(), stretches: Some(self.stretches.clone()) }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.y.len()

@@ -127,8 +127,8 @@ impl Trainer {
         windows
     }
 
-    /// Brings the derived inputs to those of `fit`.
-    fn enter(&mut self, derived: &[Derived]) {
+    /// Brings the derived inputs to these.
+    pub fn enter(&mut self, derived: &[Derived]) {
         if self.derived != derived {
             refine::set_all(&mut self.banks, derived, &self.signals);
             self.derived = derived.to_vec();

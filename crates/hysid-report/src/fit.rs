@@ -1,7 +1,7 @@
 //! The report of an identified model: the equation, the length of the model, the free run beside the recording, the loop, the
 //! residual tests, and what was decided and why.
 
-use hysid::identify::{ErrorLine, FitReport, FitSummary, Role, Series};
+use hysid::identify::{ErrorLine, FitReport, FitSummary, PathPoint, Role, Series};
 use hysid_validate::{CorrelationTest, ResidualRecord, by_branch, residual_tests};
 
 use crate::figure::{FigureError, LogAxes, Mark, Plot, Tone, envelope};
@@ -30,7 +30,7 @@ pub fn page(report: &FitReport, provenance: &Provenance) -> String {
     for series in shown(report) {
         recording(&mut page, s, series);
     }
-    length(&mut page, report);
+    length(&mut page, s);
     residuals(&mut page, report);
     errors(&mut page, s);
     page.section("What was decided, and why", "");
@@ -199,21 +199,27 @@ fn loops(input: &str, output: &str, u: &[f64], series: &[(&Vec<f64>, Tone, &str)
     plot.svg()
 }
 
-fn length(page: &mut Page, report: &FitReport) {
-    if report.path.len() < 2 {
+fn length(page: &mut Page, s: &FitSummary) {
+    if s.path.len() < 2 {
         return;
     }
     page.section(
         "How long the model should be",
-        "Free-run error against the number of terms. The held-out blocks chose the length.",
+        "Errors against the number of terms. The free run on held-out blocks chose the length. PRESS, the leave-one-out error of one step ahead, is what a regression would go by: where it still falls and the free run does not, the further terms explain the last sample and not the machine.",
     );
-    let points = |f: fn(&(usize, f64, f64)) -> f64| report.path.iter().map(|p| (p.0 as f64, f(p))).collect::<Vec<_>>();
-    let plot = Plot::new("terms", "free-run error (rms)")
-        .logarithmic(LogAxes::Y)
-        .with("estimation blocks", Tone::Faint, Mark::Line, points(|p| p.1))
-        .with("held-out blocks", Tone::After, Mark::Line, points(|p| p.2))
-        .with("", Tone::After, Mark::Dots, points(|p| p.2));
-    page.figure(plot.svg(), "The path of the selection");
+    let points = |f: fn(&PathPoint) -> f64| s.path.iter().map(|p| (p.terms as f64, f(p))).collect::<Vec<_>>();
+    let plot = |label: &str| Plot::new("terms", label).sized(430, 300).logarithmic(LogAxes::Y);
+    let free = plot("free-run error (rms)")
+        .with("estimation blocks", Tone::Faint, Mark::Line, points(|p| p.taught))
+        .with("held-out blocks", Tone::After, Mark::Line, points(|p| p.held))
+        .with("", Tone::After, Mark::Dots, points(|p| p.held));
+    let press = plot("one step, left out (rms)")
+        .with("root of PRESS / N", Tone::Other, Mark::Line, points(|p| p.press))
+        .with("", Tone::Other, Mark::Dots, points(|p| p.press));
+    page.figures(vec![
+        (free.svg(), "The free run along the path of the selection".into()),
+        (press.svg(), "PRESS of the same terms, one step ahead".into()),
+    ]);
 }
 
 fn residuals(page: &mut Page, report: &FitReport) {

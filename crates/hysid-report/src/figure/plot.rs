@@ -4,6 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::FigureError;
+use crate::words::number;
 
 /// A colour with a meaning, the same on every page. The set is told apart by people with colour-blindness too (Okabe-Ito).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -271,6 +272,10 @@ fn padded(values: impl Iterator<Item = f64>, margin: f64) -> (f64, f64) {
 /// A tick's text: as many digits as the axis needs, an exponent where the numbers are large or small.
 fn tick(value: f64, range: (f64, f64), logarithmic: bool) -> String {
     if logarithmic {
+        // Within about a decade there may be no power of ten to name.
+        if range.1 - range.0 < 1.3 {
+            return number(10f64.powf(value));
+        }
         return if (value - value.round()).abs() < 1e-6 { format!("1e{}", value.round()) } else { String::new() };
     }
     let span = range.1 - range.0;

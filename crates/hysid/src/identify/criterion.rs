@@ -4,7 +4,7 @@
 //! free run only refines the coefficients, where the model free-runs at all.
 
 use hysid_dictionary::{Design, Dictionary, Record};
-use hysid_narx::{Derived, Fit, Refine};
+use hysid_narx::{Bank, Derived, Fit, Refine};
 use hysid_select::PressForm;
 
 use super::IdentifyError;
@@ -37,11 +37,7 @@ pub(crate) fn by_criterion(
     let windows = desk.split(&trainer, LOOK)?;
     let all = family.linear.iter().chain(&family.candidates).cloned();
     let dictionary = Dictionary::from_terms(trainer.signals().clone(), all)?;
-    let records: Vec<Record<'_>> = trainer
-        .banks()
-        .iter()
-        .map(|b| Record { y: b.y(), inputs: b.inputs(), stretches: Some(b.stretches().to_vec()) })
-        .collect();
+    let records: Vec<Record<'_>> = trainer.banks().iter().map(Bank::record).collect();
     let design = Design::new(&dictionary, &records)?;
     let max_terms = desk.options.terms.unwrap_or(MOST_TERMS);
     let how = hysid_select::Options { criterion, max_terms, ..hysid_select::Options::default() };

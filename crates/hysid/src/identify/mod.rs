@@ -19,6 +19,7 @@ mod family;
 mod growth;
 mod linear;
 mod options;
+mod path;
 mod rates;
 mod recipe;
 mod report;
@@ -26,6 +27,7 @@ mod split;
 mod verify;
 
 pub use options::{Criterion, Decimate, Factors, LARGEST_DEGREE, LARGEST_LAG, LARGEST_TERMS, Options};
+pub use path::PathPoint;
 pub use recipe::{Identified, Progress, Source, identify};
 pub use report::{Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, Role, Series, TermLine};
 

@@ -12,6 +12,7 @@ use super::families::families;
 use super::family::Family;
 use super::growth::{Budget, Stage, grow, start};
 use super::linear::{Linear, best, ladder};
+use super::path::{PathPoint, path};
 use super::options::Options;
 use super::rates::{PREFER_OWN_RATE, rates};
 use super::verify::{horizon, warnings};
@@ -43,8 +44,8 @@ pub struct Identified {
     pub held_rmse: f64,
     /// How far ahead it holds on the held-out blocks.
     pub horizon: Horizon,
-    /// The path to the model: number of terms, free-run error on the samples that taught it, and on those held out.
-    pub path: Vec<(usize, f64, f64)>,
+    /// The path to the model.
+    pub path: Vec<PathPoint>,
 }
 
 /// Told what is being done, from any thread.
@@ -135,7 +136,7 @@ struct Winner<'a> {
     score: f64,
     linear: Linear,
     decisions: Vec<String>,
-    path: Vec<(usize, f64, f64)>,
+    path: Vec<PathPoint>,
 }
 
 /// A family under way.
@@ -143,6 +144,8 @@ struct Runner {
     family: Family,
     stage: Stage,
     score: f64,
+    /// The stages that it has passed through.
+    passed: Vec<Stage>,
 }
 
 impl Runner {
@@ -200,7 +203,7 @@ fn compete<'a>(mut desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>,
         .into_iter()
         .flatten();
     let mut finalists = Vec::new();
-    for (r, path) in grown {
+    for r in grown {
         decisions.push(format!(
             "{}: grown to {} terms: held-out free run {:.4e}, score {:.4e}",
             r.family.name,
@@ -208,17 +211,17 @@ fn compete<'a>(mut desk: Desk<'a>, progress: Progress<'_>) -> Result<Winner<'a>,
             r.stage.held.rmse,
             r.score
         ));
-        finalists.push((r, path));
+        finalists.push(r);
     }
     // Of models that are about equally good the one with the shortest memory, then with the fewest terms, is the soundest.
-    let lowest = finalists.iter().map(|f| f.0.score).fold(f64::INFINITY, f64::min);
-    finalists.retain(|f| f.0.score <= (1.0 + EQUAL) * lowest);
-    let winner = finalists.into_iter().min_by_key(|f| (f.0.memory(), f.0.stage.fit.terms.len()));
-    let (runner, path) = winner.unwrap_or_else(|| {
+    let lowest = finalists.iter().map(|f| f.score).fold(f64::INFINITY, f64::min);
+    finalists.retain(|f| f.score <= (1.0 + EQUAL) * lowest);
+    let winner = finalists.into_iter().min_by_key(|f| (f.memory(), f.stage.fit.terms.len()));
+    let mut runner = winner.unwrap_or_else(|| {
         let score = linear.stage.held.rmse;
-        (Runner { family: linear.family.clone(), stage: linear.stage.clone(), score }, Vec::new())
+        Runner { family: linear.family.clone(), stage: linear.stage.clone(), score, passed: Vec::new() }
     });
-    let mut runner = runner;
+    let path = path(&desk, &runner.family, &runner.passed)?;
     if let Some(stage) = by_criterion(&desk, &runner.family, &runner.stage.fit.derived)? {
         decisions.push(format!(
             "{:?} of one-step regression decided on {} terms: held-out free run {:.4e}",
@@ -253,19 +256,17 @@ fn first_round(
     let budget = Budget { terms: stage.fit.terms.len() + FIRST_TERMS, patience: FIRST_TERMS, steps: 4, exchanges: 0 };
     let path = grow(&mut trainer, &family, stage, &s.search, &s.hold, budget, Refine::Coefficients)?;
     let mut best: Option<(f64, Stage)> = None;
-    for stage in path {
-        let score = desk.score(&stage, family.given())?;
+    for stage in &path {
+        let score = desk.score(stage, family.given())?;
         if best.as_ref().is_none_or(|b| score < b.0) {
-            best = Some((score, stage));
+            best = Some((score, stage.clone()));
         }
     }
-    Ok(best.filter(|b| b.0.is_finite()).map(|(score, stage)| Runner { family, stage, score }))
+    Ok(best.filter(|b| b.0.is_finite()).map(|(score, stage)| Runner { family, stage, score, passed: path }))
 }
 
-type Grown = (Runner, Vec<(usize, f64, f64)>);
-
-fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Result<Option<Grown>, IdentifyError> {
-    let Runner { family, stage, .. } = runner;
+fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Result<Option<Runner>, IdentifyError> {
+    let Runner { family, stage, mut passed, .. } = runner;
     progress(&format!("growing {}", family.name));
     let mut trainer = desk.trainer(&family.derived, family.given())?;
     let large = family.linear.len() > LARGE;
@@ -278,15 +279,16 @@ fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Resu
     let held = trainer.error(&fit, &s.hold)?;
     let first = Stage { fit, taught, held };
     let stages = grow(&mut trainer, &family, first, &s.search, &s.hold, budget, movable(&family))?;
-    let path = stages.iter().map(|p| (p.fit.terms.len(), p.taught.rmse, p.held.rmse)).collect();
     let mut scored = Vec::new();
-    for stage in stages {
-        scored.push((desk.score(&stage, family.given())?, stage));
+    for stage in &stages {
+        scored.push((desk.score(stage, family.given())?, stage));
     }
     let lowest = scored.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
-    let near = |s: &&(f64, Stage)| s.0 <= (1.0 + NEAR) * lowest;
+    let near = |s: &&(f64, &Stage)| s.0 <= (1.0 + NEAR) * lowest;
     let pick = scored.iter().filter(near).min_by_key(|s| s.1.fit.terms.len());
-    Ok(pick.map(|(score, stage)| (Runner { family, stage: stage.clone(), score: *score }, path)))
+    let pick = pick.map(|(score, stage)| (*score, (*stage).clone()));
+    passed.extend(stages);
+    Ok(pick.map(|(score, stage)| Runner { family, stage, score, passed }))
 }
 
 fn finish(winner: Winner<'_>, mut decisions: Vec<String>, progress: Progress<'_>) -> Result<Identified, IdentifyError> {

@@ -6,7 +6,7 @@ use hysid_signal::Recording;
 use hysid_validate::{Normaliser, measure};
 use serde::Serialize;
 
-use super::{Identified, IdentifyError};
+use super::{Identified, IdentifyError, PathPoint};
 
 /// Which part a recording played.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -101,6 +101,8 @@ pub struct FitSummary {
     pub held_out_rmse: f64,
     /// How far ahead the model holds.
     pub horizon: Horizon,
+    /// The errors against the number of terms on the path to the model.
+    pub path: Vec<PathPoint>,
     /// What was decided and why.
     pub decisions: Vec<String>,
     /// What to be wary of.
@@ -139,8 +141,6 @@ pub struct FitReport {
     pub latex: String,
     /// The series of each recording, estimation first.
     pub series: Vec<Series>,
-    /// Free-run error against the number of terms on the path to the model: terms, taught, held out.
-    pub path: Vec<(usize, f64, f64)>,
 }
 
 impl FitReport {
@@ -215,11 +215,12 @@ impl FitReport {
             },
             held_out_rmse: identified.held_rmse,
             horizon: identified.horizon,
+            path: identified.path.clone(),
             decisions: identified.decisions.clone(),
             warnings: identified.warnings.clone(),
             seed,
         };
-        Ok(Self { summary, latex: model.latex(), series, path: identified.path.clone() })
+        Ok(Self { summary, latex: model.latex(), series })
     }
 }
 
