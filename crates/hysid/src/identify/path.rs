@@ -101,7 +101,8 @@ mod tests {
         let y: Vec<f64> = (0..60).map(|n| u[n] * u[n] + 0.3 * f64::from(((n * 13) % 17) as u8) / 17.0).collect();
         let channel = |name: &str, x: &[f64]| Channel { name: name.into(), samples: x.to_vec() };
         let recording =
-            Recording::new("r", Clock { start_s: 0.0, period_s: 1.0 }, vec![channel("u", &u), channel("y", &y)]).unwrap();
+            Recording::new("r", Clock { start_s: 0.0, period_s: 1.0 }, vec![channel("u", &u), channel("y", &y)])
+                .unwrap();
         let (recordings, inputs) = ([recording], ["u".to_string()]);
         let source = Source { recordings: &recordings, inputs: &inputs, output: "y" };
         let choices = Choices::default();
@@ -117,8 +118,7 @@ mod tests {
         let mut sum = 0.0;
         for &left_out in &rows {
             let rest: Vec<usize> = rows.iter().copied().filter(|n| *n != left_out).collect();
-            let columns: Vec<Vec<f64>> =
-                used.iter().map(|&k| rest.iter().map(|&n| value(k, n)).collect()).collect();
+            let columns: Vec<Vec<f64>> = used.iter().map(|&k| rest.iter().map(|&n| value(k, n)).collect()).collect();
             let target: Vec<f64> = rest.iter().map(|&n| y[n]).collect();
             let theta = lstsq(&Matrix::from_columns(&columns).unwrap(), &target).unwrap().theta;
             let predicted: f64 = used.iter().zip(&theta).map(|(&k, t)| t * value(k, left_out)).sum();
