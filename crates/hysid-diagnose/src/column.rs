@@ -38,6 +38,7 @@ pub fn stand_in(
 ) -> Result<StandIn, DiagnoseError> {
     let Some(first) = recordings.first() else { return Err(DiagnoseError::NoRecording) };
     let period_s = first.clock().period_s;
+    // Of a signal about its mean; 0 for one that never changes.
     let size = |name: &str| -> Result<f64, DiagnoseError> {
         let channel: &Channel = first.channel(name).ok_or_else(|| DiagnoseError::MissingColumn {
             recording: first.name().to_owned(),
@@ -45,10 +46,22 @@ pub fn stand_in(
             available: first.channels().iter().map(|c| format!("`{}`", c.name)).collect::<Vec<_>>().join(", "),
         })?;
         let finite: Vec<f64> = channel.samples.iter().copied().filter(|x| x.is_finite()).collect();
-        let mean = finite.iter().sum::<f64>() / finite.len().max(1) as f64;
+        if finite.windows(2).all(|w| w[0] == w[1]) {
+            return Ok(0.0);
+        }
+        let mean = finite.iter().sum::<f64>() / finite.len() as f64;
         Ok(rms(&finite.iter().map(|x| x - mean).collect::<Vec<_>>()))
     };
-    size(output)?;
+    for name in [output, simulated] {
+        if size(name)? == 0.0 {
+            let value = first.channel(name).and_then(|c| c.samples.iter().copied().find(|x| x.is_finite()));
+            return Err(DiagnoseError::ConstantOutput {
+                recording: first.name().to_owned(),
+                column: name.to_owned(),
+                value: value.unwrap_or(f64::NAN),
+            });
+        }
+    }
     let scale = size(simulated)?;
     let sizes = inputs.iter().map(|i| size(i)).collect::<Result<Vec<_>, _>>()?;
     let gain = scale / sizes.first().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);

@@ -31,6 +31,22 @@ pub enum DiagnoseError {
         /// Samples needed.
         needed: usize,
     },
+    /// A recording with so many gaps that nothing can be simulated in one go.
+    #[error(
+        "{recording}: samples are missing so often that only {found} of them lie in runs that can be simulated (at least {run} rows with all inputs, of them {measured} measured in a row); at least {needed} are needed"
+    )]
+    TooManyGaps {
+        /// The recording.
+        recording: String,
+        /// Samples in such runs.
+        found: usize,
+        /// Rows with all inputs in a row.
+        run: usize,
+        /// Rows of them with an output in a row.
+        measured: usize,
+        /// Samples needed.
+        needed: usize,
+    },
     /// A measured output that never changes.
     #[error("{recording}: column `{column}` is constant ({value}); a constant output cannot be diagnosed")]
     ConstantOutput {

@@ -10,3 +10,4 @@ pub mod generate;
 pub mod inspect;
 pub mod predict;
 pub mod simulate;
+mod simulation_file;

@@ -33,10 +33,7 @@ const STEP_TOLERANCE: f64 = 1e-5;
 /// # Errors
 /// A simulation or recording that cannot be used; a simulation that is not finite.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let name = args.simulation.display().to_string();
-    let text = std::fs::read_to_string(&args.simulation)
-        .map_err(|e| Failure::BadInput(format!("{name}: cannot be read: {e}")))?;
-    let simulation = Simulation::parse(&text, &name).map_err(Failure::bad_input)?;
+    let (simulation, name) = super::simulation_file::read(&args.simulation)?;
     let compiled = Compiled::new(&simulation).map_err(|e| Failure::BadInput(format!("{name}: {e}")))?;
     let (recording, measured) = read(&args.input, &simulation)?;
     let outputs = simulate(&compiled, &recording, measured).map_err(|e| Failure::BadInput(format!("{name}: {e}")))?;
@@ -118,8 +115,7 @@ fn simulate(compiled: &Compiled, recording: &Recording, measured: Measured) -> R
         let run = Run::new(&data.drive, &theta).from(Start::States(&x)).with_substeps(steps.substeps);
         let response = compiled.simulate(&run);
         if response.diverged.is_some() {
-            let u: Vec<f64> = data.drive.inputs().iter().map(|s| s.first().copied().unwrap_or(0.0)).collect();
-            return Err(compiled.explain_divergence(&theta, &x, &u, &response));
+            return Err(super::simulation_file::explain(compiled, &data.drive, &x, &response));
         }
         if steps.error > STEP_TOLERANCE {
             eprintln!(

@@ -172,8 +172,9 @@ impl Signals {
 
     fn band(&self) -> (f64, f64) {
         let nyquist = 0.5 / self.period_s;
-        let high = self.band_hz.1.clamp(2.0 / self.duration_s(), nyquist);
-        let low = self.band_hz.0.clamp(1.0 / self.duration_s(), high);
+        // A few samples can be too short for any band: the higher end then holds.
+        let high = self.band_hz.1.max(2.0 / self.duration_s()).min(nyquist);
+        let low = self.band_hz.0.max(1.0 / self.duration_s()).min(high);
         (low, high)
     }
 

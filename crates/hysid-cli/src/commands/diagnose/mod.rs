@@ -1,16 +1,21 @@
 //! `hysid diagnose`: what a simulation leaves out, found from recordings.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+mod folder;
+mod intake;
+
+use std::path::PathBuf;
+use std::time::Instant;
 
 use anyhow::Context;
-use hysid_diagnose::{Hooks, Options, Request, diagnose, stand_in};
-use hysid_io::{ReadOptions, TimeSource, read_recording};
-use hysid_plant::{ClockSource, Simulation};
-use hysid_signal::Recording;
+use hysid_diagnose::{DiagnoseError, Hooks, Options, Request, diagnose, stand_in};
 
+use self::folder::Folder;
+use self::intake::{Files, Intake};
+use super::simulation_file;
 use crate::failure::Failure;
+
+/// Threads at most.
+const MOST_THREADS: usize = 1024;
 
 /// Find what physics a simulation leaves out: where it parts from a recording, a name, a sentence, a better simulation
 #[derive(Debug, clap::Args)]
@@ -58,7 +63,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::BadInput(format!("--time-limit is {limit}; allowed is a number of seconds above zero")));
     }
     let threads = match args.threads {
-        Some(0) => return Err(Failure::BadInput("--threads is 0; allowed is 1 or more".into())),
+        Some(n) if !(1..=MOST_THREADS).contains(&n) => {
+            return Err(Failure::BadInput(format!("--threads is {n}; allowed is 1 to {MOST_THREADS}")));
+        }
         Some(n) => n,
         None => std::thread::available_parallelism().map_or(1, usize::from),
     };
@@ -68,33 +75,25 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 fn work(args: &Args) -> Result<(), Failure> {
     let began = Instant::now();
-    let limit = args.time_limit.map(Duration::from_secs_f64);
     let options = Options { alpha: args.alpha, seed: args.seed };
     let progress = |step: &str| eprintln!("hysid: {step} ...");
-    let expired = || limit.is_some_and(|l| began.elapsed() > l);
+    let expired = || args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > limit);
     let hooks = Hooks { progress: &progress, expired: &expired };
-    let outcome = match (&args.simulation, &args.simulated) {
+    let files = Files { estimation: &args.recording, holdout: &args.holdout };
+    let (outcome, folder) = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
-            let text =
-                std::fs::read_to_string(file).map_err(|e| Failure::BadInput(format!("{}: {e}", file.display())))?;
-            let name = file.display().to_string();
-            let simulation = Simulation::parse(&text, &name).map_err(Failure::bad_input)?;
-            let estimation = recordings(&args.recording, &simulation)?;
-            let holdout = recordings(&args.holdout, &simulation)?;
-            diagnose(
-                &Request { simulation: &simulation, file: &name, estimation: &estimation, holdout: &holdout, options },
-                &hooks,
-            )
+            let (simulation, name) = simulation_file::read(file)?;
+            let Intake { estimation, holdout } = files.of_simulation(&simulation)?;
+            let folder = Folder::claim(&args.out)?;
+            let request =
+                Request { simulation: &simulation, file: &name, estimation: &estimation, holdout: &holdout, options };
+            (diagnose(&request, &hooks).map_err(|e| refused(&e, &request))?, folder)
         }
         (None, Some(column)) => {
             let output = args.output.clone().unwrap_or_default();
             let columns: Vec<String> = args.input.iter().cloned().chain([output.clone(), column.clone()]).collect();
-            let read_all = |files: &[PathBuf]| -> Result<Vec<Recording>, Failure> {
-                let options = ReadOptions { columns: Some(columns.clone()), ..ReadOptions::default() };
-                files.iter().map(|f| read(f, &options)).collect()
-            };
-            let estimation = read_all(&args.recording)?;
-            let holdout = read_all(&args.holdout)?;
+            let Intake { estimation, holdout } = files.of_columns(&columns)?;
+            let folder = Folder::claim(&args.out)?;
             progress("finding a clone of the simulated column");
             let stand_in =
                 stand_in(&args.input, &output, column, &estimation, args.seed).map_err(Failure::bad_input)?;
@@ -105,25 +104,22 @@ fn work(args: &Args) -> Result<(), Failure> {
                 holdout: &holdout,
                 options,
             };
-            diagnose(&request, &hooks).map(|mut outcome| {
-                outcome.file.notes.insert(0, stand_in.note.clone());
-                outcome
-            })
+            let mut outcome = diagnose(&request, &hooks).map_err(|e| refused(&e, &request))?;
+            outcome.file.notes.insert(0, stand_in.note);
+            (outcome, folder)
         }
         (None, None) => {
             return Err(Failure::BadInput("give a simulation file, or --simulated with --input and --output".into()));
         }
-    }
-    .map_err(Failure::bad_input)?;
+    };
 
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::BadInput(format!("--out {}: {e}", args.out.display())))?;
     let page = hysid_report::diagnosis::page(&outcome.file, &outcome.picture, &crate::provenance());
-    hysid_io::write_text(&args.out.join("report.html"), &page).context("writing the report")?;
-    if let Some(augmented) = &outcome.augmented {
-        hysid_io::write_text(&args.out.join("augmented.sim.toml"), &augmented.to_toml())
-            .context("writing the augmented simulation")?;
+    folder.text("report.html", &page)?;
+    match &outcome.augmented {
+        Some(augmented) => folder.text("augmented.sim.toml", &augmented.to_toml())?,
+        None => folder.without("augmented.sim.toml")?,
     }
-    hysid_io::write_json(&args.out.join("diagnosis.json"), &outcome.file).context("writing the verdict")?;
+    folder.json("diagnosis.json", &outcome.file)?;
     println!("{}: {}", outcome.file.verdict.word(), outcome.file.summary);
     for f in &outcome.file.fit {
         if let (Some(before), Some(after)) = (f.rmse_before, f.rmse_after) {
@@ -133,23 +129,15 @@ fn work(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The recordings with the columns that the simulation names.
-fn recordings(files: &[PathBuf], simulation: &Simulation) -> Result<Vec<Recording>, Failure> {
-    let time = match &simulation.time.clock {
-        ClockSource::Column(name) => TimeSource::Column(name.clone()),
-        ClockSource::Period(p) => TimeSource::Period(*p),
+/// Bad input, told; of a simulation that diverges also which state does.
+fn refused(error: &DiagnoseError, request: &Request<'_>) -> Failure {
+    let why = match error {
+        DiagnoseError::Explodes { recording, .. } => request
+            .estimation
+            .iter()
+            .find(|r| r.name() == recording)
+            .and_then(|r| simulation_file::explosion(request.simulation, r)),
+        _ => None,
     };
-    let mut seen = BTreeSet::new();
-    let columns: Vec<String> = simulation
-        .inputs
-        .iter()
-        .map(|i| i.column.clone())
-        .chain(simulation.outputs.iter().map(|o| o.column.clone()))
-        .filter(|c| seen.insert(c.clone()))
-        .collect();
-    files.iter().map(|f| read(f, &ReadOptions { time: time.clone(), columns: Some(columns.clone()) })).collect()
-}
-
-fn read(file: &Path, options: &ReadOptions) -> Result<Recording, Failure> {
-    read_recording(file, options).map_err(Failure::bad_input)
+    Failure::BadInput(why.map_or_else(|| error.to_string(), |why| format!("{error}: {why}")))
 }

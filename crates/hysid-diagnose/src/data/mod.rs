@@ -1,0 +1,192 @@
+//! The data set of a diagnosis: recordings cut into stretches that can be simulated in one go, and the stack of their outputs.
+//!
+//! A stretch is a run of samples in which no input is missing; outputs may have gaps inside (their rows are left out). Each stretch has
+//! its own initial state. Rows are ordered by stretch, then output, then time.
+
+mod cut;
+mod windows;
+
+use std::ops::Range;
+
+use hysid_plant::Drive;
+
+use crate::evidence::{Layout, Series};
+
+pub use windows::held_out_blocks;
+
+/// Gaps cut a recording into stretches; shorter ones than this are left out.
+const SHORTEST_STRETCH: usize = 24;
+/// Rows of one output shorter than this between gaps are left out.
+const SHORTEST_SERIES: usize = 8;
+
+/// A run of samples without a missing input.
+#[derive(Debug, Clone)]
+pub struct Stretch {
+    /// Which recording.
+    pub recording: usize,
+    /// Which of its samples.
+    pub samples: Range<usize>,
+    /// Time of the first sample, in seconds.
+    pub start_s: f64,
+    /// The inputs, in the order of the simulation's.
+    pub drive: Drive,
+    /// One column for each output of the simulation; `NaN` where missing.
+    pub outputs: Vec<Vec<f64>>,
+}
+
+impl Stretch {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+}
+
+/// All estimation (or all hold-out) data.
+#[derive(Debug, Clone)]
+pub struct DataSet {
+    /// Sampling period of the first recording, in seconds.
+    pub period_s: f64,
+    /// Names of the recordings.
+    pub recordings: Vec<String>,
+    /// The stretches.
+    pub stretches: Vec<Stretch>,
+    /// The rows.
+    pub layout: Layout,
+    /// The stacked measured outputs.
+    pub y: Vec<f64>,
+    /// Sentences about gaps and what was left out.
+    pub notes: Vec<String>,
+}
+
+impl DataSet {
+    fn from_stretches(
+        period_s: f64,
+        recordings: Vec<String>,
+        stretches: Vec<Stretch>,
+        outputs: usize,
+        notes: Vec<String>,
+    ) -> Self {
+        let mut layout = Layout { series: Vec::new(), outputs };
+        let mut y = Vec::new();
+        for (stretch, s) in stretches.iter().enumerate() {
+            for (output, column) in s.outputs.iter().enumerate() {
+                for range in runs(column.iter().map(|v| v.is_finite())) {
+                    if range.len() < SHORTEST_SERIES {
+                        continue;
+                    }
+                    let rows = y.len()..y.len() + range.len();
+                    y.extend_from_slice(&column[range.clone()]);
+                    layout.series.push(Series { stretch, output, first: range.start, rows });
+                }
+            }
+        }
+        Self { period_s, recordings, stretches, layout, y, notes }
+    }
+
+    /// One stretch with these inputs and outputs (`outputs[output][sample]`).
+    pub fn of_drive(drive: Drive, outputs: Vec<Vec<f64>>, period_s: f64) -> Self {
+        let count = outputs.len();
+        let stretch = Stretch { recording: 0, samples: 0..drive.len(), start_s: drive.start_s(), drive, outputs };
+        Self::from_stretches(period_s, vec![String::new()], vec![stretch], count, Vec::new())
+    }
+
+    /// Number of samples to simulate.
+    pub fn samples(&self) -> usize {
+        self.stretches.iter().map(Stretch::len).sum()
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.y.len()
+    }
+
+    /// Stacks simulated outputs (`outputs[stretch][output][sample]`) in the order of the rows.
+    pub fn stack(&self, outputs: &[Vec<Vec<f64>>]) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.rows());
+        for s in &self.layout.series {
+            out.extend_from_slice(&outputs[s.stretch][s.output][s.first..s.first + s.rows.len()]);
+        }
+        out
+    }
+
+    /// Time of a row, in seconds, with the recording that it is from.
+    pub fn time_of_rows(&self, series: &Series) -> impl Iterator<Item = f64> + '_ {
+        let start = self.stretches[series.stretch].start_s;
+        let first = series.first;
+        let period_s = self.stretches[series.stretch].drive.period_s();
+        (0..series.rows.len()).map(move |n| start + (first + n) as f64 * period_s)
+    }
+
+    /// The same data with only those rows for which `wanted(stretch, sample, samples of the stretch)` holds; the inputs stay.
+    pub fn keep(&self, wanted: impl Fn(usize, usize, usize) -> bool) -> Self {
+        let mut stretches = self.stretches.clone();
+        for (i, s) in stretches.iter_mut().enumerate() {
+            let len = s.len();
+            for column in &mut s.outputs {
+                column.iter_mut().enumerate().filter(|(n, _)| !wanted(i, *n, len)).for_each(|(_, y)| *y = f64::NAN);
+            }
+        }
+        Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, self.notes.clone())
+    }
+
+    /// The same inputs with other measured outputs (in the order of the rows).
+    pub fn with_outputs(&self, y: Vec<f64>) -> Self {
+        let mut out = self.clone();
+        for s in &self.layout.series {
+            out.stretches[s.stretch].outputs[s.output][s.first..s.first + s.rows.len()]
+                .copy_from_slice(&y[s.rows.clone()]);
+        }
+        out.y = y;
+        out
+    }
+}
+
+/// The runs of `true`.
+fn runs(good: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
+    let mut out = Vec::new();
+    let (mut start, mut n) = (None, 0);
+    for g in good {
+        match (g, start) {
+            (true, None) => start = Some(n),
+            (false, Some(s)) => {
+                out.push(s..n);
+                start = None;
+            }
+            _ => {}
+        }
+        n += 1;
+    }
+    if let Some(s) = start {
+        out.push(s..n);
+    }
+    out
+}
+
+/// What the tests of this module share.
+#[cfg(test)]
+mod samples {
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
+    pub fn simulation() -> Simulation {
+        Simulation::parse(
+            "[time]\nperiod_s = 0.1\n[inputs]\nu = \"u_N\"\n[parameters]\nk = { value = 1.0, min = 0.0 }\n[outputs]\ny_m = \"k*u\"\n",
+            "test.sim.toml",
+        )
+        .unwrap()
+    }
+
+    pub fn recording(u: Vec<f64>, y: Vec<f64>) -> Recording {
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "y_m".into(), samples: y }];
+        Recording::new("r.csv", Clock { start_s: 0.0, period_s: 0.1 }, channels).unwrap()
+    }
+
+    pub fn ramp(n: usize) -> Vec<f64> {
+        (0..n).map(|i| i as f64).collect()
+    }
+}

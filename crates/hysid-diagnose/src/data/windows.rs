@@ -1,0 +1,121 @@
+//! Parts of a data set: windows that a search can afford, and blocks that are held out.
+
+use hysid_plant::Drive;
+
+use super::{DataSet, SHORTEST_STRETCH, Stretch};
+use crate::evidence::Layout;
+
+impl DataSet {
+    /// A data set of at most about `limit` samples: windows of equal length, the first and the last at the ends of the data and the loudest
+    /// among them, so that thousands of simulations of a long recording stay affordable. The data set itself where it is short enough.
+    pub fn within(&self, limit: usize) -> Self {
+        let total = self.samples();
+        if total <= limit {
+            return self.clone();
+        }
+        let windows = 4.max(self.stretches.len().min(8));
+        let length = (limit / windows).max(SHORTEST_STRETCH);
+        let mut chosen: Vec<Stretch> = Vec::new();
+        for s in &self.stretches {
+            let share = ((windows * s.len()) as f64 / total as f64).round().max(1.0) as usize;
+            let length = length.min(s.len());
+            let mut starts: Vec<usize> =
+                if share == 1 { vec![0] } else { (0..share).map(|i| i * (s.len() - length) / (share - 1)).collect() };
+            let power = |start: usize| -> f64 {
+                let y = &s.outputs[0][start..start + length];
+                let v: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
+                let mean = v.iter().sum::<f64>() / v.len().max(1) as f64;
+                v.iter().map(|x| (x - mean).powi(2)).sum()
+            };
+            // One window in the middle moves to the loudest place, unless it would overlap the others.
+            if share > 2 {
+                let loudest = (0..=(s.len() - length) / length.max(1))
+                    .map(|i| i * length)
+                    .max_by(|a, b| power(*a).total_cmp(&power(*b)));
+                if let Some(loudest) = loudest {
+                    let middle = share / 2;
+                    let clear = starts.iter().enumerate().all(|(i, &o)| i == middle || loudest.abs_diff(o) >= length);
+                    if clear {
+                        starts[middle] = loudest;
+                    }
+                }
+            }
+            starts.sort_unstable();
+            starts.dedup_by(|b, a| *b < *a + length);
+            for start in starts {
+                let range = start..start + length;
+                let start_s = s.start_s + start as f64 * s.drive.period_s();
+                let inputs = s.drive.inputs().iter().map(|c| c[range.clone()].to_vec()).collect();
+                // The parts of a good drive are a good drive.
+                let Ok(drive) = Drive::new(start_s, s.drive.period_s(), length, inputs) else { continue };
+                chosen.push(Stretch {
+                    recording: s.recording,
+                    samples: s.samples.start + start..s.samples.start + start + length,
+                    start_s,
+                    drive,
+                    outputs: s.outputs.iter().map(|c| c[range.clone()].to_vec()).collect(),
+                });
+            }
+        }
+        let mut notes = self.notes.clone();
+        let used: usize = chosen.iter().map(Stretch::len).sum();
+        notes.push(format!("of {total} samples the search used {used}, in {} windows", chosen.len()));
+        Self::from_stretches(self.period_s, self.recordings.clone(), chosen, self.layout.outputs, notes)
+    }
+}
+
+/// The rows that are held out of the estimation to veto and to break ties: `1` where a row takes part in the fit, `0` where it is held out.
+///
+/// Each long series is cut into ten blocks; the third, the sixth and the ninth are held out, and the loudest one if it is none of these.
+pub fn held_out_blocks(layout: &Layout, y: &[f64]) -> Vec<f64> {
+    let mut weights = vec![1.0; layout.len()];
+    for s in &layout.series {
+        let n = s.rows.len();
+        if n < 100 {
+            continue;
+        }
+        let edges: Vec<usize> = (0..=10).map(|i| i * n / 10).collect();
+        let rows = &y[s.rows.clone()];
+        let mean = rows.iter().sum::<f64>() / n as f64;
+        let power = |i: usize| {
+            rows[edges[i]..edges[i + 1]].iter().map(|v| (v - mean).powi(2)).sum::<f64>()
+                / (edges[i + 1] - edges[i]) as f64
+        };
+        let mut out = vec![2, 5, 8];
+        if let Some(loudest) = (0..10).max_by(|a, b| power(*a).total_cmp(&power(*b)))
+            && !out.contains(&loudest)
+            && power(loudest) > 1.5 * power(2).max(power(5)).max(power(8))
+        {
+            out.push(loudest);
+        }
+        for i in out {
+            weights[s.rows.start + edges[i]..s.rows.start + edges[i + 1]].fill(0.0);
+        }
+    }
+    weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{ramp, recording, simulation};
+    use super::*;
+    use crate::evidence::Series;
+
+    #[test]
+    fn a_long_recording_is_windowed_from_end_to_end() {
+        let n = 10_000;
+        let d = DataSet::new(&simulation(), &[recording(ramp(n), (0..n).map(|i| (i as f64 * 0.1).sin()).collect())], 1)
+            .unwrap();
+        let w = d.within(4000);
+        assert!(w.samples() <= 4000 && w.samples() > 2500, "{}", w.samples());
+        assert_eq!(w.stretches.first().unwrap().samples.start, 0);
+        assert_eq!(w.stretches.last().unwrap().samples.end, n);
+    }
+
+    #[test]
+    fn three_blocks_of_ten_are_held_out() {
+        let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..1000 }], outputs: 1 };
+        let y: Vec<f64> = (0..1000).map(|i| (i as f64 * 0.7).sin()).collect();
+        assert_eq!(held_out_blocks(&layout, &y).iter().filter(|w| **w == 0.0).count(), 300);
+    }
+}
