@@ -45,9 +45,12 @@ pub(crate) fn picture(s: &Sitting<'_, '_>) -> Picture {
     let predicted =
         |base: &Base<'_>| -> Vec<f64> { s.data.y.iter().zip(&base.fit.residual).map(|(y, e)| y - e).collect() };
     let (first, second) = (predicted(&s.none.base), found.then(|| predicted(&s.best.base)));
-    let mut records = records(s, s.data, Role::Estimation, Some(&first), second.as_deref());
+    let mut records = records(s, s.data, Role::Estimation, Some(&first), second.as_deref(), None);
     let (before, after) = (s.before.map(|r| r.prediction.as_slice()), s.after.map(|r| r.prediction.as_slice()));
-    records.extend(self::records(s, s.held, Role::HoldOut, before, after));
+    let scored: Vec<bool> = (0..s.held.rows())
+        .map(|row| s.before.is_none_or(|r| r.scored[row]) && s.after.is_none_or(|r| r.scored[row]))
+        .collect();
+    records.extend(self::records(s, s.held, Role::HoldOut, before, after, Some(&scored)));
     Picture {
         title: s.simulation.title.clone(),
         records,
@@ -69,6 +72,7 @@ fn records(
     role: Role,
     before: Option<&[f64]>,
     after: Option<&[f64]>,
+    scored: Option<&[bool]>,
 ) -> Vec<RecordPicture> {
     let mut out = Vec::new();
     for (recording, name) in data.recordings.iter().enumerate() {
@@ -80,6 +84,9 @@ fn records(
                 output: output.column.clone(),
                 unit: unit_of(&output.column),
                 role,
+                place: recording,
+                samples: Vec::new(),
+                scored: Vec::new(),
                 time_s: Vec::new(),
                 measured: Vec::new(),
                 before: Vec::new(),
@@ -88,14 +95,22 @@ fn records(
                 held_out_s: Vec::new(),
             };
             for series in mine {
-                if let Some(&last) = picture.time_s.last() {
+                if let (Some(&time), Some(&sample)) = (picture.time_s.last(), picture.samples.last()) {
                     // A break in the lines where samples are missing.
-                    picture.time_s.push(last);
+                    picture.time_s.push(time);
+                    picture.samples.push(sample);
+                    picture.scored.push(false);
                     picture.measured.push(f64::NAN);
                     picture.before.push(f64::NAN);
                     picture.after.iter_mut().for_each(|a| a.push(f64::NAN));
                 }
                 picture.time_s.extend(data.time_of_rows(series));
+                let first = data.stretches[series.stretch].samples.start + series.first;
+                picture.samples.extend(first..first + series.rows.len());
+                match scored {
+                    Some(scored) => picture.scored.extend_from_slice(&scored[series.rows.clone()]),
+                    None => picture.scored.resize(picture.time_s.len(), false),
+                }
                 picture.measured.extend_from_slice(&data.y[series.rows.clone()]);
                 match before {
                     Some(b) => picture.before.extend_from_slice(&b[series.rows.clone()]),

@@ -30,6 +30,12 @@ pub struct RecordPicture {
     pub unit: String,
     /// What the recording was used for.
     pub role: Role,
+    /// Its place among the recordings of its role.
+    pub place: usize,
+    /// The recording's sample (counted from 0) of each entry.
+    pub samples: Vec<usize>,
+    /// Whether an entry counts for the free-run error; none does in a recording that was used for the estimation.
+    pub scored: Vec<bool>,
     /// Time in seconds.
     pub time_s: Vec<f64>,
     /// What was recorded.

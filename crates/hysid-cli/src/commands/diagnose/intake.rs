@@ -12,7 +12,7 @@ use crate::failure::Failure;
 /// The column that holds the time where nothing else is said.
 const TIME: &str = "t_s";
 /// Relative difference of two sampling periods from which they contradict each other.
-const SAME_PERIOD: f64 = 1e-3;
+pub const SAME_PERIOD: f64 = 1e-3;
 
 /// Estimation and hold-out recordings.
 #[derive(Debug)]

@@ -1,5 +1,6 @@
 //! `hysid diagnose`: what a simulation leaves out, found from recordings.
 
+mod black_box;
 mod folder;
 mod intake;
 
@@ -7,7 +8,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context;
-use hysid_diagnose::{DiagnoseError, Hooks, Options, Request, diagnose, stand_in};
+use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose, stand_in};
+use hysid_plant::Simulation;
 
 use self::folder::Folder;
 use self::intake::{Files, Intake};
@@ -83,28 +85,19 @@ fn work(args: &Args) -> Result<(), Failure> {
     let (outcome, folder) = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
             let (simulation, name) = simulation_file::read(file)?;
-            let Intake { estimation, holdout } = files.of_simulation(&simulation)?;
+            let intake = files.of_simulation(&simulation)?;
             let folder = Folder::claim(&args.out)?;
-            let request =
-                Request { simulation: &simulation, file: &name, estimation: &estimation, holdout: &holdout, options };
-            (diagnose(&request, &hooks).map_err(|e| refused(&e, &request))?, folder)
+            (answer(&simulation, &name, &intake, options, &hooks)?, folder)
         }
         (None, Some(column)) => {
             let output = args.output.clone().unwrap_or_default();
             let columns: Vec<String> = args.input.iter().cloned().chain([output.clone(), column.clone()]).collect();
-            let Intake { estimation, holdout } = files.of_columns(&columns)?;
+            let intake = files.of_columns(&columns)?;
             let folder = Folder::claim(&args.out)?;
             progress("finding a clone of the simulated column");
             let stand_in =
-                stand_in(&args.input, &output, column, &estimation, args.seed).map_err(Failure::bad_input)?;
-            let request = Request {
-                simulation: &stand_in.simulation,
-                file: column,
-                estimation: &estimation,
-                holdout: &holdout,
-                options,
-            };
-            let mut outcome = diagnose(&request, &hooks).map_err(|e| refused(&e, &request))?;
+                stand_in(&args.input, &output, column, &intake.estimation, args.seed).map_err(Failure::bad_input)?;
+            let mut outcome = answer(&stand_in.simulation, column, &intake, options, &hooks)?;
             outcome.file.notes.insert(0, stand_in.note);
             (outcome, folder)
         }
@@ -127,6 +120,25 @@ fn work(args: &Args) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// The diagnosis, with a black box beside it.
+fn answer(
+    simulation: &Simulation,
+    file: &str,
+    intake: &Intake,
+    options: Options,
+    hooks: &Hooks<'_>,
+) -> Result<Diagnosis, Failure> {
+    let request = Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, options };
+    let mut outcome = diagnose(&request, hooks).map_err(|e| refused(&e, &request))?;
+    if (hooks.expired)() {
+        outcome.file.notes.push("the time limit was reached: no black box was identified beside the simulation".into());
+    } else {
+        (hooks.progress)("identifying a black box for comparison");
+        black_box::score(&mut outcome.file, &outcome.picture, simulation, intake, options.seed);
+    }
+    Ok(outcome)
 }
 
 /// Bad input, told; of a simulation that diverges also which state does.
