@@ -23,7 +23,7 @@ pub struct FreeRun {
 pub fn free_run(document: &Simulation, data: &DataSet, own_states: &[String], substeps: usize) -> Option<FreeRun> {
     let mut fixed = document.clone();
     fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
-    let head = data.keep(|_, n, len| (n as f64) < HEAD * len as f64);
+    let head = data.head(HEAD);
     let model = Model::new(&fixed, &head, own_states, substeps).ok()?;
     let free = !model.unknowns().is_empty();
     let mut values = Values::default();

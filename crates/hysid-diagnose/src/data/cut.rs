@@ -1,6 +1,7 @@
 //! Recordings cut into stretches at the samples where an input is missing, and refused where too little is left.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use hysid_plant::{ClockSource, Drive, Simulation};
 use hysid_signal::Recording;
@@ -81,12 +82,14 @@ impl DataSet {
                 }
                 let start_s = r.clock().start_s + own_period_s * range.start as f64;
                 let inputs = u.iter().map(|c| c[range.clone()].to_vec()).collect();
+                let outputs: Vec<Vec<f64>> = y.iter().map(|c| c[range.clone()].to_vec()).collect();
                 stretches.push(Stretch {
                     recording: index,
                     start_s,
                     drive: Drive::new(start_s, own_period_s, range.len(), inputs)
                         .map_err(|e| DiagnoseError::Simulation { file: r.name().to_owned(), problem: e.to_string() })?,
-                    outputs: y.iter().map(|c| c[range.clone()].to_vec()).collect(),
+                    recorded: Arc::new(outputs.clone()),
+                    outputs,
                     samples: range,
                 });
             }
@@ -147,6 +150,14 @@ mod tests {
         assert_eq!(d.notes.len(), 1);
         let outputs: Vec<Vec<Vec<f64>>> = d.stretches.iter().map(|s| s.outputs.clone()).collect();
         assert_eq!(d.stack(&outputs), d.y);
+    }
+
+    #[test]
+    fn the_head_of_held_out_blocks_is_what_was_recorded() {
+        let d = DataSet::new(&simulation(), &[recording(ramp(200), ramp(200))], 1).unwrap();
+        let blocks = d.keep(|_, n, _| n >= 100);
+        assert_eq!(blocks.rows(), 100);
+        assert_eq!(blocks.head(0.05).y, (0..10).map(f64::from).collect::<Vec<_>>());
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod cut;
 mod windows;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use hysid_plant::Drive;
 
@@ -30,8 +31,10 @@ pub struct Stretch {
     pub start_s: f64,
     /// The inputs, in the order of the simulation's.
     pub drive: Drive,
-    /// One column for each output of the simulation; `NaN` where missing.
+    /// One column for each output of the simulation; `NaN` where missing or held out.
     pub outputs: Vec<Vec<f64>>,
+    /// The same with nothing held out: what a free initial state may be estimated from.
+    pub recorded: Arc<Vec<Vec<f64>>>,
 }
 
 impl Stretch {
@@ -91,7 +94,9 @@ impl DataSet {
     /// One stretch with these inputs and outputs (`outputs[output][sample]`).
     pub fn of_drive(drive: Drive, outputs: Vec<Vec<f64>>, period_s: f64) -> Self {
         let count = outputs.len();
-        let stretch = Stretch { recording: 0, samples: 0..drive.len(), start_s: drive.start_s(), drive, outputs };
+        let recorded = Arc::new(outputs.clone());
+        let stretch =
+            Stretch { recording: 0, samples: 0..drive.len(), start_s: drive.start_s(), drive, outputs, recorded };
         Self::from_stretches(period_s, vec![String::new()], vec![stretch], count, Vec::new())
     }
 
@@ -134,6 +139,13 @@ impl DataSet {
         Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, self.notes.clone())
     }
 
+    /// The first samples of each stretch (this share of them), those included that are held out elsewhere.
+    pub fn head(&self, share: f64) -> Self {
+        let mut all = self.clone();
+        all.stretches.iter_mut().for_each(|s| s.outputs.clone_from(&s.recorded));
+        all.keep(|_, n, len| (n as f64) < share * len as f64)
+    }
+
     /// The same inputs with other measured outputs (in the order of the rows).
     pub fn with_outputs(&self, y: Vec<f64>) -> Self {
         let mut out = self.clone();
@@ -141,6 +153,7 @@ impl DataSet {
             out.stretches[s.stretch].outputs[s.output][s.first..s.first + s.rows.len()]
                 .copy_from_slice(&y[s.rows.clone()]);
         }
+        out.stretches.iter_mut().for_each(|s| s.recorded = Arc::new(s.outputs.clone()));
         out.y = y;
         out
     }

@@ -1,5 +1,7 @@
 //! Parts of a data set: windows that a search can afford, and blocks that are held out.
 
+use std::sync::Arc;
+
 use hysid_plant::Drive;
 
 use super::{DataSet, SHORTEST_STRETCH, Stretch};
@@ -45,15 +47,18 @@ impl DataSet {
             for start in starts {
                 let range = start..start + length;
                 let start_s = s.start_s + start as f64 * s.drive.period_s();
-                let inputs = s.drive.inputs().iter().map(|c| c[range.clone()].to_vec()).collect();
+                let part = |columns: &[Vec<f64>]| columns.iter().map(|c| c[range.clone()].to_vec()).collect::<Vec<_>>();
                 // The parts of a good drive are a good drive.
-                let Ok(drive) = Drive::new(start_s, s.drive.period_s(), length, inputs) else { continue };
+                let Ok(drive) = Drive::new(start_s, s.drive.period_s(), length, part(s.drive.inputs())) else {
+                    continue;
+                };
                 chosen.push(Stretch {
                     recording: s.recording,
                     samples: s.samples.start + start..s.samples.start + start + length,
                     start_s,
                     drive,
-                    outputs: s.outputs.iter().map(|c| c[range.clone()].to_vec()).collect(),
+                    outputs: part(&s.outputs),
+                    recorded: Arc::new(part(&s.recorded)),
                 });
             }
         }
