@@ -7,6 +7,17 @@
 use crate::error::Check;
 use crate::{Differential, ParameterError};
 
+/// Dahl friction of exponent 1 and Coulomb force 1 after the input has moved by `du`, exactly: from its last force `f` towards the
+/// direction's sign, over the travel `length` (above 0, in the input's unit). A NaN passes through.
+#[inline]
+pub fn dahl(f: f64, du: f64, length: f64) -> f64 {
+    if du == 0.0 {
+        return f;
+    }
+    let s = du.signum();
+    s + (f - s) * (-du.abs() / length).exp()
+}
+
 /// Dahl friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dahl {
@@ -79,6 +90,17 @@ mod tests {
         approx::assert_abs_diff_eq!(y[2], up(0.8), epsilon = 1e-7);
         let down = -f_c + (up(0.8) + f_c) * (-sigma * 0.7 / f_c).exp();
         approx::assert_abs_diff_eq!(y[3], down, epsilon = 1e-6);
+    }
+
+    #[test]
+    fn the_exact_step_is_the_differential_law_of_shape_one() {
+        let inputs = [0.0, 0.3, 0.8, 0.1, 0.1, -0.9, 0.4];
+        let law = Sampled::new(Dahl::new(1.0 / 0.7, 1.0, 1.0).unwrap(), 1.0, 200).unwrap().run(&inputs);
+        let mut f = 0.0;
+        for (pair, expected) in inputs.windows(2).zip(&law[1..]) {
+            f = dahl(f, pair[1] - pair[0], 0.7);
+            approx::assert_abs_diff_eq!(f, *expected, epsilon = 1e-8);
+        }
     }
 
     #[test]

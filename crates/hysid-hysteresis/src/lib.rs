@@ -34,7 +34,7 @@ mod stop;
 
 pub use baber_noori::{BaberNoori, Degradation, Pinching};
 pub use bouc_wen::{BoucWen, BoucWenParameters};
-pub use dahl::Dahl;
+pub use dahl::{Dahl, dahl};
 pub use differential::{Differential, Sampled, SampledState, rk4};
 pub use duhem::{Duhem, DuhemParameters};
 pub use error::ParameterError;

@@ -17,6 +17,9 @@ pub enum Law {
     Play {
         /// Half-width, from 0.
         half_width: f64,
+        /// Where the source came from to its first sample: the level at which it had turned, after a long way to it. `None`: the
+        /// play rests with the first sample.
+        came_from: Option<f64>,
     },
     /// Rate-independent presliding friction from -1 to 1: dw = (sgn(dx) - w) |dx| / length, integrated exactly.
     Dahl {
@@ -53,7 +56,10 @@ impl Law {
     /// The law as the user reads it, with `x` for its source.
     pub fn describe(&self, x: &str) -> String {
         match self {
-            Self::Play { half_width } => format!("play({x}, {half_width:.6})"),
+            Self::Play { half_width, came_from: None } => format!("play({x}, {half_width:.6})"),
+            Self::Play { half_width, came_from: Some(level) } => {
+                format!("play({x}, {half_width:.6}), as if {x} had turned at {level:.6} before")
+            }
             Self::Dahl { length } => format!("presliding friction of {x} over {length:.6}"),
             Self::Filter { a } => {
                 let a: Vec<String> = a.iter().map(|v| format!("{v:.6}")).collect();
@@ -68,7 +74,7 @@ impl Law {
     /// The numbers that refinement may move.
     pub fn parameters(&self) -> Vec<f64> {
         match self {
-            Self::Play { half_width } => vec![*half_width],
+            Self::Play { half_width, .. } => vec![*half_width],
             Self::Dahl { length } => vec![length.max(f64::MIN_POSITIVE).ln()],
             Self::Filter { a } => a.clone(),
             Self::SoftThreshold { centre, width } => vec![*centre, width.max(f64::MIN_POSITIVE).ln()],
@@ -78,7 +84,7 @@ impl Law {
     /// The same law with these numbers, as [`Law::parameters`] gave them; `None` where they are not allowed.
     pub fn with_parameters(&self, p: &[f64]) -> Option<Self> {
         let law = match (self, p) {
-            (Self::Play { .. }, &[half_width]) => Self::Play { half_width },
+            (Self::Play { came_from, .. }, &[half_width]) => Self::Play { half_width, came_from: *came_from },
             (Self::Dahl { .. }, &[l]) => Self::Dahl { length: l.exp() },
             (Self::Filter { a }, p) if p.len() == a.len() => Self::Filter { a: p.to_vec() },
             (Self::SoftThreshold { .. }, &[centre, w]) => Self::SoftThreshold { centre, width: w.exp() },
@@ -90,8 +96,11 @@ impl Law {
     /// What is wrong with its numbers, if anything.
     pub fn problem(&self) -> Option<String> {
         match self {
-            Self::Play { half_width } if !(half_width.is_finite() && *half_width >= 0.0) => {
+            Self::Play { half_width, .. } if !(half_width.is_finite() && *half_width >= 0.0) => {
                 Some(format!("half-width {half_width}; it must be a finite number of 0 or more"))
+            }
+            Self::Play { came_from: Some(level), .. } if !level.is_finite() => {
+                Some(format!("came from {level}; it must be a finite number"))
             }
             Self::Dahl { length } if !(length.is_finite() && *length > 0.0) => {
                 Some(format!("length {length}; it must be a finite number above 0"))
@@ -108,8 +117,13 @@ impl Law {
     pub fn respond(&self, x: &[f64], out: &mut [f64]) {
         let Some(&first) = x.first() else { return };
         match self {
-            Self::Play { half_width } => {
-                let mut w = first;
+            Self::Play { half_width, came_from } => {
+                let mut w = match *came_from {
+                    None => first,
+                    // On the way up from a turning point the play lies above the level, on the way down below.
+                    Some(level) if level <= first => level + half_width,
+                    Some(level) => level - half_width,
+                };
                 for (o, &x) in out.iter_mut().zip(x) {
                     w = hysid_hysteresis::play(w, x, *half_width);
                     *o = w;
@@ -118,12 +132,8 @@ impl Law {
             Self::Dahl { length } => {
                 let (mut w, mut before) = (0.0, first);
                 for (o, &x) in out.iter_mut().zip(x) {
-                    let dx = x - before;
+                    w = hysid_hysteresis::dahl(w, x - before, *length);
                     before = x;
-                    if dx != 0.0 {
-                        let s = dx.signum();
-                        w = s + (w - s) * (-dx.abs() / length).exp();
-                    }
                     *o = w;
                 }
             }
@@ -218,6 +228,27 @@ mod tests {
     }
 
     #[test]
+    fn a_play_remembers_where_its_source_came_from() {
+        let x = [0.0, 0.2, 1.0, 0.9];
+        // The law, and its answer to x.
+        let cases = [
+            (None, [0.0, 0.0, 0.5, 0.5]),
+            // It had turned at -0.4 with the play at 0.1.
+            (Some(-0.4), [0.1, 0.1, 0.5, 0.5]),
+            // From far below the play lags behind, from far above it lies ahead.
+            (Some(-9.0), [-0.5, -0.3, 0.5, 0.5]),
+            (Some(9.0), [0.5, 0.5, 0.5, 0.5]),
+        ];
+        for (came_from, expected) in cases {
+            let mut out = [0.0; 4];
+            Law::Play { half_width: 0.5, came_from }.respond(&x, &mut out);
+            for (a, b) in out.iter().zip(expected) {
+                assert!((a - b).abs() < 1e-14, "{came_from:?}: {out:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_soft_threshold_is_the_part_above_and_does_not_overflow() {
         let law = Law::SoftThreshold { centre: 1.0, width: 0.01 };
         let mut out = [0.0; 3];
@@ -228,7 +259,7 @@ mod tests {
     #[test]
     fn parameters_return() {
         for law in [
-            Law::Play { half_width: 0.3 },
+            Law::Play { half_width: 0.3, came_from: Some(-1.0) },
             Law::Dahl { length: 2.0 },
             Law::Filter { a: vec![-0.5, 0.2] },
             Law::SoftThreshold { centre: -1.0, width: 0.5 },
@@ -238,6 +269,6 @@ mod tests {
                 assert!((a - b).abs() < 1e-14);
             }
         }
-        assert!(Law::Play { half_width: 0.3 }.with_parameters(&[-1.0]).is_none());
+        assert!(Law::Play { half_width: 0.3, came_from: None }.with_parameters(&[-1.0]).is_none());
     }
 }

@@ -42,10 +42,21 @@ struct FileSignal {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(tag = "law", rename_all = "snake_case")]
 enum FileLaw {
-    Play { half_width: f64 },
-    Dahl { length: f64 },
-    Filter { a: Vec<f64> },
-    SoftThreshold { centre: f64, width: f64 },
+    Play {
+        half_width: f64,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        came_from: Option<f64>,
+    },
+    Dahl {
+        length: f64,
+    },
+    Filter {
+        a: Vec<f64>,
+    },
+    SoftThreshold {
+        centre: f64,
+        width: f64,
+    },
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -119,7 +130,7 @@ fn to_file(parts: &Parts) -> FileModel {
         of: inputs[d.source].symbol.clone(),
         sign_threshold: n.threshold,
         law: match &d.law {
-            Law::Play { half_width } => FileLaw::Play { half_width: *half_width },
+            Law::Play { half_width, came_from } => FileLaw::Play { half_width: *half_width, came_from: *came_from },
             Law::Dahl { length } => FileLaw::Dahl { length: *length },
             Law::Filter { a } => FileLaw::Filter { a: a.clone() },
             Law::SoftThreshold { centre, width } => FileLaw::SoftThreshold { centre: *centre, width: *width },
@@ -160,7 +171,7 @@ fn from_file(file: FileModel) -> Result<Parts, NarxError> {
             return Err(NarxError::BadDerived { symbol: d.symbol, problem });
         };
         let law = match d.law {
-            FileLaw::Play { half_width } => Law::Play { half_width },
+            FileLaw::Play { half_width, came_from } => Law::Play { half_width, came_from },
             FileLaw::Dahl { length } => Law::Dahl { length },
             FileLaw::Filter { a } => Law::Filter { a },
             FileLaw::SoftThreshold { centre, width } => Law::SoftThreshold { centre, width },

@@ -211,6 +211,26 @@ impl Trainer {
         Ok(RunError { rmse: outcome.rmse(), diverged: outcome.diverged })
     }
 
+    /// The residual of each window's free run, sample by sample; `NaN` where the run is given or has diverged.
+    ///
+    /// # Errors
+    /// Windows of recordings that there are not.
+    pub fn residuals(&mut self, fit: &Fit, windows: &[Window]) -> Result<Vec<Vec<f64>>, NarxError> {
+        self.enter(&fit.derived);
+        let program = Program::new(&fit.terms);
+        windows
+            .iter()
+            .map(|w| {
+                let bank = bank_of(&self.banks, w.record)?;
+                let trace = run(&program, &fit.theta, bank, &w.range, self.rules)?;
+                let end = trace.diverged.unwrap_or(w.range.end);
+                let known = w.range.start + self.rules.given..end;
+                let residual = |(n, p): (usize, &f64)| if known.contains(&n) { bank.y[n] - p } else { f64::NAN };
+                Ok(w.range.clone().zip(&trace.y).map(residual).collect())
+            })
+            .collect()
+    }
+
     /// The largest distance of each window's free run from `centre`; infinite where it diverged.
     ///
     /// # Errors

@@ -42,9 +42,17 @@ impl NarxModel {
         for (i, d) in self.parts().derived.iter().enumerate() {
             let (w, x) = (p.recorded + i, d.source);
             let line = match &d.law {
-                Law::Play { half_width } => format!(
-                    "x[{w}][0] = s->started ? fmax(x[{x}][0] - {r}, fmin(x[{x}][0] + {r}, x[{w}][1])) : x[{x}][0];",
-                    r = number(*half_width)
+                Law::Play { half_width, came_from } => format!(
+                    "x[{w}][0] = fmax(x[{x}][0] - {r}, fmin(x[{x}][0] + {r}, s->started ? x[{w}][1] : {start}));",
+                    r = number(*half_width),
+                    start = match came_from {
+                        None => format!("x[{x}][0]"),
+                        Some(h) => format!(
+                            "({h} <= x[{x}][0] ? {h} + {r} : {h} - {r})",
+                            h = number(*h),
+                            r = number(*half_width)
+                        ),
+                    }
                 ),
                 Law::Dahl { length } => format!(
                     "{{ double d = s->started ? x[{x}][0] - x[{x}][1] : 0.0, g = d < 0.0 ? -1.0 : 1.0, w = s->started ? x[{w}][1] : 0.0; \
@@ -112,9 +120,17 @@ impl NarxModel {
         for (i, d) in self.parts().derived.iter().enumerate() {
             let (w, x) = (p.recorded + i, d.source);
             let lines = match &d.law {
-                Law::Play { half_width } => vec![format!(
-                    "x[{w}][0] = max(x[{x}][0] - {r}, min(x[{x}][0] + {r}, x[{w}][1])) if started else x[{x}][0]",
-                    r = number(*half_width)
+                Law::Play { half_width, came_from } => vec![format!(
+                    "x[{w}][0] = max(x[{x}][0] - {r}, min(x[{x}][0] + {r}, x[{w}][1] if started else {start}))",
+                    r = number(*half_width),
+                    start = match came_from {
+                        None => format!("x[{x}][0]"),
+                        Some(h) => format!(
+                            "({h} + {r} if {h} <= x[{x}][0] else {h} - {r})",
+                            h = number(*h),
+                            r = number(*half_width)
+                        ),
+                    }
                 )],
                 Law::Dahl { length } => vec![
                     format!("d, w = (x[{x}][0] - x[{x}][1], x[{w}][1]) if started else (0.0, 0.0)"),

@@ -36,6 +36,8 @@ const HELD: usize = 300;
 const STRETCH: usize = 1200;
 /// Size of pulses on the inputs, in standard deviations.
 const PULSE: f64 = 0.7;
+/// Parts of the held-out blocks, at least, on which models are compared pair by pair.
+const PARTS: usize = 12;
 /// A share of failed trials counts as this multiple of itself in the error.
 const PENALTY: f64 = 2.0;
 
@@ -100,12 +102,18 @@ impl<'a> Desk<'a> {
         Ok(split(&windows, trainer.given(), most))
     }
 
-    /// Drops the trials that this fit does not endure: where even a linear model leaves the range (an integrator under a held
-    /// input), leaving it is physics and not a fault.
-    pub(crate) fn calibrate_trials(&mut self, fit: &Fit, given: usize) -> Result<(), IdentifyError> {
-        let endured = self.endured(fit, given)?;
-        let mut keep = endured.iter();
-        self.trials.retain(|_| keep.next().copied().unwrap_or(true));
+    /// Drops the trials that none of these linear models endures: where even a linear model leaves the range (an integrator
+    /// under a held input), leaving it is physics and not a fault. A model that is alone in leaving it is at fault.
+    pub(crate) fn calibrate_trials<'m>(
+        &mut self,
+        models: impl Iterator<Item = (&'m Fit, usize)>,
+    ) -> Result<(), IdentifyError> {
+        let mut keep = vec![false; self.trials.len()];
+        for (fit, given) in models {
+            keep.iter_mut().zip(self.endured(fit, given)?).for_each(|(k, e)| *k |= e);
+        }
+        let mut keep = keep.into_iter();
+        self.trials.retain(|_| keep.next().unwrap_or(true));
         Ok(())
     }
 
@@ -132,6 +140,22 @@ impl<'a> Desk<'a> {
         Ok(endured)
     }
 
+    /// The mean squared error of a fit on parts of the held-out blocks, the same parts for every model.
+    pub(crate) fn held_parts(&self, fit: &Fit, given: usize) -> Result<Vec<f64>, IdentifyError> {
+        let mut trainer = self.trainer(&fit.derived, given)?;
+        let hold = self.split(&trainer, usize::MAX / 8)?.hold;
+        let parts = PARTS.div_ceil(hold.len().max(1));
+        let mut out = Vec::new();
+        for residual in trainer.residuals(fit, &hold)? {
+            for part in residual.chunks(residual.len().div_ceil(parts).max(1)) {
+                let there = part.iter().filter(|e| e.is_finite());
+                let n = there.clone().count();
+                out.push(there.map(|e| e * e).sum::<f64>() / n.max(1) as f64);
+            }
+        }
+        Ok(out)
+    }
+
     /// The held-out error, raised by the share of failed trials: what models are compared by.
     pub(crate) fn score(&self, stage: &Stage, given: usize) -> Result<f64, IdentifyError> {
         if !stage.held.rmse.is_finite() {
@@ -139,6 +163,15 @@ impl<'a> Desk<'a> {
         }
         Ok(stage.held.rmse * (1.0 + PENALTY * self.failed_trials(&stage.fit, given)?))
     }
+}
+
+/// Whether errors `a` exceed errors `b`, on the same parts, by no more than the standard error of their mean difference.
+pub(crate) fn within_chance(a: &[f64], b: &[f64]) -> bool {
+    let d: Vec<f64> = a.iter().zip(b).map(|(p, q)| p - q).collect();
+    let n = d.len() as f64;
+    let mean = d.iter().sum::<f64>() / n;
+    let variance = d.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    a.len() == b.len() && mean <= (variance / n).sqrt()
 }
 
 /// The trials: at some places of the recordings, inputs held, diminished and enlarged about their mean, with pulses.

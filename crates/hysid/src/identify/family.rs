@@ -1,7 +1,7 @@
 //! Families of models that compete: which linear terms a model starts from, and which terms may join.
 
 use hysid_dictionary::{Factor, Signal, Term};
-use hysid_narx::Derived;
+use hysid_narx::{Derived, Law};
 
 /// One family.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +25,12 @@ impl Family {
     pub(crate) fn given(&self) -> usize {
         let reach = self.linear.iter().chain(&self.candidates).map(Term::reach).max().unwrap_or(0);
         reach.max(1)
+    }
+
+    /// What families share that are near copies of each other: their lags and the number of plays.
+    pub(crate) fn kind(&self) -> (usize, usize, usize) {
+        let plays = self.derived.iter().filter(|d| matches!(d.law, Law::Play { .. })).count();
+        (self.ny, self.nu, plays)
     }
 }
 

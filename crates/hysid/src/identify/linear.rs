@@ -4,6 +4,7 @@ use super::IdentifyError;
 use super::desk::Desk;
 use super::family::{Family, linear};
 use super::growth::{Stage, start};
+use super::recipe::PER_TERM;
 
 /// A linear model with its lags.
 #[derive(Debug, Clone)]
@@ -16,6 +17,8 @@ pub(crate) struct Linear {
 const LADDER: [usize; 9] = [1, 2, 3, 4, 6, 9, 14, 20, 30];
 /// A longer model must lower the held-out error by this share at least.
 const WORTH: f64 = 0.05;
+/// Within this multiple of the lowest held-out error a linear model is a witness of what the machine endures.
+const GOOD: f64 = 2.0;
 /// Number of parameters beyond which a linear model is not tried.
 const MOST_PARAMETERS: usize = 130;
 /// Samples that linear models are fitted to.
@@ -67,7 +70,7 @@ pub(crate) fn ladder(desk: &Desk<'_>, progress: &(dyn Fn(&str) + Sync)) -> Resul
 
 fn one(desk: &Desk<'_>, family: Family) -> Result<Option<Linear>, IdentifyError> {
     let mut trainer = desk.trainer(&[], family.given())?;
-    let s = desk.split(&trainer, LOOK)?;
+    let s = desk.split(&trainer, LOOK.max(PER_TERM * family.linear.len()))?;
     let stage = start(&mut trainer, &family, &s.search, &s.hold)?;
     Ok(stage.map(|stage| Linear { family, stage }))
 }
@@ -75,6 +78,12 @@ fn one(desk: &Desk<'_>, family: Family) -> Result<Option<Linear>, IdentifyError>
 /// The one with the lowest held-out error.
 pub(crate) fn best(found: &[Linear]) -> Option<&Linear> {
     found.iter().min_by(|a, b| a.stage.held.rmse.total_cmp(&b.stage.held.rmse))
+}
+
+/// Those whose held-out error is not far from the lowest.
+pub(crate) fn good(found: &[Linear]) -> impl Iterator<Item = &Linear> {
+    let lowest = best(found).map_or(0.0, |b| b.stage.held.rmse);
+    found.iter().filter(move |l| l.stage.held.rmse <= GOOD * lowest)
 }
 
 /// The shortest one whose held-out error is near the lowest.

@@ -20,6 +20,7 @@ mod growth;
 mod linear;
 mod options;
 mod path;
+mod plays;
 mod rates;
 mod recipe;
 mod report;
