@@ -85,7 +85,14 @@ fn main() {
         black_box(compiled.simulate_many(black_box(&runs)));
     }) / 32.0;
     println!("each of 32          {:8.1} us {:6.2}", many * 1e6, many / hand);
-    for count in [2, 4, 8, 16] {
+    for count in [1, 2] {
+        let directions: Vec<Direction<'_>> = (0..count).map(|i| Direction::Parameter(i % 4)).collect();
+        let time = smallest(20, || {
+            black_box(compiled.sensitivities_many(black_box(&runs), &directions));
+        }) / 32.0;
+        println!("each of 32 with {count:2}  {:8.1} us {:6.2}", time * 1e6, time / hand);
+    }
+    for count in [1, 2, 4, 8, 16] {
         let directions: Vec<Direction<'_>> = (0..count).map(|i| Direction::Parameter(i % 4)).collect();
         let time = smallest(20, || {
             black_box(compiled.sensitivities(black_box(&run), &directions));

@@ -1,7 +1,8 @@
 //! How many integration steps a sampling period needs: the step-halving check.
 
 use super::Compiled;
-use super::run::{Drive, Run, Start};
+use super::drive::Drive;
+use super::run::{Run, Start};
 
 /// Most steps in one sampling period that are tried.
 const MOST: usize = 64;

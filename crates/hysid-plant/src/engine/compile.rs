@@ -11,12 +11,15 @@ pub struct Compiled {
     pub(super) simulation: Simulation,
     pub(super) nodes: Vec<Node>,
     pub(super) surfaces: Vec<SurfaceNodes>,
+    /// Whether every surface's argument is a state.
+    pub(super) plain_surfaces: bool,
+    /// Whether there is a delay: its control flow rests on values, so runs in lanes cannot share it.
+    pub(super) has_delay: bool,
     /// Which cells are delays of what rests on inputs only (these follow the hold exactly).
     pub(super) delay_of_input: Vec<bool>,
     /// Leaves by kind: (register, index).
     pub(super) input_leaves: Vec<(NodeId, usize)>,
     pub(super) rate_leaves: Vec<(NodeId, usize)>,
-    pub(super) state_leaves: Vec<(NodeId, usize)>,
     pub(super) sigma_leaves: Vec<(NodeId, usize)>,
     pub(super) parameter_leaves: Vec<(NodeId, usize)>,
     pub(super) time_leaf: Option<NodeId>,
@@ -25,13 +28,15 @@ pub struct Compiled {
     pub(super) outputs: Vec<NodeId>,
     /// What rests on parameters only: run once.
     pub(super) prologue: Program,
-    /// State derivatives.
+    /// What the state derivatives need of inputs, time and operators on them, once for each moment.
+    pub(super) stimulus: Program,
+    /// State derivatives, after the stimulus.
     pub(super) flow: Program,
     /// Arguments of the switching surfaces.
     pub(super) switches: Program,
     /// Derivatives of the switching surfaces' arguments.
     pub(super) gradients: Program,
-    /// The operators with memory, to be committed at the end of a step.
+    /// The operators with memory that the stimulus has not, to be committed at the end of a step.
     pub(super) memories: Program,
     /// Outputs.
     pub(super) measure: Program,
@@ -77,16 +82,15 @@ impl Compiled {
 
         let mut delay_of_input = vec![false; cells as usize];
         let mut memory_nodes = Vec::new();
-        let mut leaves: [Vec<(NodeId, usize)>; 5] = Default::default();
+        let mut leaves: [Vec<(NodeId, usize)>; 4] = Default::default();
         let mut time_leaf = None;
         for (id, node) in nodes.iter().enumerate() {
             let id = id as NodeId;
             match *node {
                 Node::Input(i) => leaves[0].push((id, i as usize)),
                 Node::InputRate(i) => leaves[1].push((id, i as usize)),
-                Node::State(i) => leaves[2].push((id, i as usize)),
-                Node::Sigma(i) => leaves[3].push((id, i as usize)),
-                Node::Parameter(i) => leaves[4].push((id, i as usize)),
+                Node::Sigma(i) => leaves[2].push((id, i as usize)),
+                Node::Parameter(i) => leaves[3].push((id, i as usize)),
                 Node::Time => time_leaf = Some(id),
                 Node::Delay(w, _, cell) => {
                     memory_nodes.push(id);
@@ -98,25 +102,49 @@ impl Compiled {
                 _ => {}
             }
         }
-        let [input_leaves, rate_leaves, state_leaves, sigma_leaves, parameter_leaves] = leaves;
+        let [input_leaves, rate_leaves, sigma_leaves, parameter_leaves] = leaves;
         let all_constant = (0..nodes.len() as NodeId).filter(|id| constant(*id));
         let gradient_roots = surfaces.iter().flat_map(|s| {
             let inputs = s.by_input.iter().map(|(_, id)| *id);
             s.by_state.iter().map(|(_, id)| *id).chain(inputs).chain(s.by_time)
         });
+        // Where the state derivatives take up what rests on inputs and time.
+        let mut stimuli = Vec::new();
+        let mut seen = vec![false; nodes.len()];
+        let mut open = derivatives.clone();
+        while let Some(id) = open.pop() {
+            let Some(flag) = seen.get_mut(id as usize).filter(|flag| !**flag) else { continue };
+            *flag = true;
+            match level_of(id) {
+                0 => {}
+                1 => stimuli.push(id),
+                _ => open.extend(nodes.get(id as usize).into_iter().flat_map(|n| n.operands()).flatten()),
+            }
+        }
+        // What of it a step has evaluated at its end by itself, so that it need not be evaluated to be committed.
+        let mut held = vec![false; nodes.len()];
+        let mut open = stimuli.clone();
+        while let Some(id) = open.pop() {
+            let Some(flag) = held.get_mut(id as usize).filter(|flag| !**flag) else { continue };
+            *flag = true;
+            open.extend(nodes.get(id as usize).into_iter().flat_map(|n| n.operands()).flatten());
+        }
+        let stimulated = |id: NodeId| held.get(id as usize).copied().unwrap_or(false);
         Ok(Self {
             prologue: Program::new(&nodes, all_constant, |_| false),
-            flow: Program::new(&nodes, derivatives.iter().copied(), constant),
+            stimulus: Program::new(&nodes, stimuli, constant),
+            flow: Program::new(&nodes, derivatives.iter().copied(), |id| level_of(id) < 2),
             switches: Program::new(&nodes, surfaces.iter().map(|s| s.argument), constant),
             gradients: Program::new(&nodes, gradient_roots, constant),
-            memories: Program::new(&nodes, memory_nodes, constant),
+            memories: Program::new(&nodes, memory_nodes.into_iter().filter(|&id| !stimulated(id)), constant),
             measure: Program::new(&nodes, outputs.iter().copied(), constant),
             simulation: simulation.clone(),
+            has_delay: nodes.iter().any(|n| matches!(n, Node::Delay(..))),
+            plain_surfaces: surfaces.iter().all(|s| s.state.is_some()),
             surfaces,
             delay_of_input,
             input_leaves,
             rate_leaves,
-            state_leaves,
             sigma_leaves,
             parameter_leaves,
             time_leaf,

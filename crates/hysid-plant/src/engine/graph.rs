@@ -1,6 +1,7 @@
 //! The graph of all equations: one node for each distinct subexpression (equal subexpressions are shared).
 //!
-//! A node's operands have smaller numbers than the node, so the order of numbers is an order of evaluation.
+//! A node's operands have smaller numbers than the node, so the order of numbers is an order of evaluation. The first nodes
+//! are the states, in their order.
 
 use std::collections::HashMap;
 
@@ -116,6 +117,10 @@ pub(super) struct Graph<'a> {
     simulation: &'a Simulation,
     pub nodes: Vec<Node>,
     known: HashMap<Key, NodeId>,
+    /// Which nodes rest on parameters and numbers only.
+    constant: Vec<bool>,
+    /// Divisions are kept as they are written (within a `floor`, which may turn a rounding into a jump).
+    exact: bool,
     /// The node that a text was built into, to keep the arguments of surfaces apart.
     surfaces: Vec<(Expr, SurfaceNodes)>,
     pub cells: u32,
@@ -123,7 +128,19 @@ pub(super) struct Graph<'a> {
 
 impl<'a> Graph<'a> {
     pub fn new(simulation: &'a Simulation) -> Self {
-        Self { simulation, nodes: Vec::new(), known: HashMap::new(), surfaces: Vec::new(), cells: 0 }
+        let mut graph = Self {
+            simulation,
+            nodes: Vec::new(),
+            known: HashMap::new(),
+            constant: Vec::new(),
+            exact: false,
+            surfaces: Vec::new(),
+            cells: 0,
+        };
+        for i in 0..simulation.states.len() {
+            graph.push(Node::State(i as u32));
+        }
+        graph
     }
 
     pub fn surfaces(self) -> (Vec<Node>, Vec<SurfaceNodes>, u32) {
@@ -134,9 +151,37 @@ impl<'a> Graph<'a> {
         let next = self.nodes.len() as NodeId;
         let id = *self.known.entry(key(node)).or_insert(next);
         if id == next {
+            let moves = matches!(
+                node,
+                Node::Time
+                    | Node::Input(_)
+                    | Node::InputRate(_)
+                    | Node::State(_)
+                    | Node::Sigma(_)
+                    | Node::Play(..)
+                    | Node::Relay(..)
+                    | Node::Lag(..)
+                    | Node::Delay(..)
+            );
+            let constant = !moves && node.operands().into_iter().flatten().all(|o| self.is_constant(o));
+            self.constant.push(constant);
             self.nodes.push(node);
         }
         id
+    }
+
+    fn is_constant(&self, id: NodeId) -> bool {
+        self.constant.get(id as usize).copied().unwrap_or(false)
+    }
+
+    /// A quotient; by what rests on parameters only it is a product with the inverse, which is taken once in a run.
+    fn quotient(&mut self, left: NodeId, right: NodeId) -> NodeId {
+        if self.exact || !self.is_constant(right) || self.is_constant(left) {
+            return self.push(Node::Div(left, right));
+        }
+        let one = self.push(Node::Constant(1.0));
+        let inverse = self.push(Node::Div(one, right));
+        self.push(Node::Mul(left, inverse))
     }
 
     fn cell(&mut self, make: impl Fn(u32) -> Node) -> NodeId {
@@ -188,6 +233,9 @@ impl<'a> Graph<'a> {
                     }
                 }
                 let right = self.build(b);
+                if *op == BinaryOp::Div {
+                    return self.quotient(left, right);
+                }
                 self.push(match op {
                     BinaryOp::Add => Node::Add(left, right),
                     BinaryOp::Sub => Node::Sub(left, right),
@@ -198,7 +246,10 @@ impl<'a> Graph<'a> {
             }
             Expr::Call(f @ (Function::Sign | Function::Step), arguments) => self.switch(*f, arguments),
             Expr::Call(f, arguments) => {
+                let outside = self.exact;
+                self.exact |= *f == Function::Floor;
                 let ids: Vec<NodeId> = arguments.iter().map(|a| self.build(a)).collect();
+                self.exact = outside;
                 let node = match (f, ids.as_slice()) {
                     (Function::Atan2, &[a, b]) => Node::Atan2(a, b),
                     (Function::Min, &[a, b]) => Node::Min(a, b),

@@ -1,9 +1,10 @@
 //! The linear model beside one operating point, by forward differentiation of the equations.
 
 use super::Compiled;
-use super::integrate::Machine;
-use super::run::{Direction, Drive, Injection, Run, Slot, Start};
-use crate::number::Dual;
+use super::drive::Drive;
+use super::machine::Machine;
+use super::run::{Direction, Injection, Run, Slot, Start};
+use crate::number::Lanes;
 
 /// `dx/dt = A x + B u`, `y = C x + D u` beside an operating point; matrices by rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +48,8 @@ impl Compiled {
         }
         let run = Run::new(&drive, theta).from(Start::States(x));
         for (chunk, directions) in directions.chunks(CHUNK).enumerate() {
-            let (flow, outputs) = Machine::<Dual<CHUNK>>::new(self, &run, directions).beside();
+            let machine = Machine::<Lanes<1, CHUNK>>::new(self, std::slice::from_ref(&run), directions);
+            let Some((flow, outputs)) = machine.map(Machine::beside) else { continue };
             for (k, column) in (chunk * CHUNK..).take(directions.len()).enumerate() {
                 let (to_flow, to_outputs, width, column) = if column < n {
                     (&mut out.a, &mut out.c, n, column)

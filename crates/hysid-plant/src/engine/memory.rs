@@ -12,19 +12,31 @@
 //! - A half-width, time constant or delay below zero acts as zero.
 
 use crate::expr::Function;
-use crate::number::Number;
+use crate::number::{Lanes, Number, Span};
 
-/// When an operator is evaluated.
+/// When an operator is evaluated; `S` is a plain length of time or one with tangents.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moment<N> {
-    /// Seconds since the first sample.
-    pub elapsed: N,
+pub(super) struct Moment<S> {
+    /// Seconds from the first sample to the present one.
+    pub sample_s: f64,
+    /// Seconds since the present sample.
+    pub tau: S,
     /// Seconds since the last commit.
-    pub since: N,
+    pub since: S,
     /// Length of the step that is tried; 0 where an output is evaluated.
-    pub step: N,
+    pub step: S,
     /// What `since` is.
     pub phase: Phase,
+}
+
+impl<S> Moment<S> {
+    /// Seconds since the first sample.
+    fn elapsed<N>(&self) -> N
+    where
+        S: Span<N>,
+    {
+        self.tau.line(self.sample_s, 1.0)
+    }
 }
 
 /// Where in a step an evaluation stands.
@@ -47,6 +59,25 @@ pub(super) enum Follow {
     Smooth,
 }
 
+/// What a length of time does to a lag.
+#[derive(Debug, Clone, Copy)]
+struct Decay<N> {
+    since: f64,
+    /// The time constant over the length.
+    ratio: N,
+    /// What is left of a difference after the length.
+    decay: N,
+}
+
+impl<N: Number> Decay<N> {
+    fn new<S: Span<N>>(since: S, tau: N) -> Self {
+        let length = since.seconds();
+        // Below a thousandth of the time gone the exponential is zero; the time constant then acts by the slope alone.
+        let decay = length.div(tau.max(length.scale(1e-3))).neg().call(Function::Exp);
+        Self { since: since.value(), ratio: tau.div(length), decay }
+    }
+}
+
 /// One operator's memory.
 #[derive(Debug, Clone)]
 pub(super) struct Cell<N> {
@@ -58,23 +89,58 @@ pub(super) struct Cell<N> {
     now: (N, N),
     /// Committed arguments with their times (delays only).
     past: Vec<(N, N)>,
+    /// Where in `past` the last look-up ended.
+    hint: usize,
+    /// Of a lag: what a plain length of time does, for the lengths that were met last.
+    decays: [Option<Decay<N>>; 2],
     follow: Follow,
     /// The first evaluation fills the memory.
     filled: bool,
 }
 
+impl<const L: usize, const T: usize> Cell<Lanes<L, T>> {
+    /// What one lane remembers, without the past of a delay.
+    pub fn lane(&self, lane: usize) -> Cell<Lanes<1, T>> {
+        Cell {
+            held: self.held.lane(lane),
+            argument: self.argument.lane(lane),
+            now: (self.now.0.lane(lane), self.now.1.lane(lane)),
+            filled: self.filled,
+            ..Cell::new(self.follow)
+        }
+    }
+
+    /// Makes one lane remember what another memory does, without the past of a delay.
+    pub fn set_lane(&mut self, lane: usize, from: &Cell<Lanes<1, T>>) {
+        self.held.set_lane(lane, from.held);
+        self.argument.set_lane(lane, from.argument);
+        self.now.0.set_lane(lane, from.now.0);
+        self.now.1.set_lane(lane, from.now.1);
+    }
+}
+
 impl<N: Number> Cell<N> {
     pub fn new(follow: Follow) -> Self {
         let zero = N::lift(0.0);
-        Self { held: zero, argument: zero, now: (zero, zero), past: Vec::new(), follow, filled: false }
+        Self {
+            held: zero,
+            argument: zero,
+            now: (zero, zero),
+            past: Vec::new(),
+            hint: 0,
+            decays: [None; 2],
+            follow,
+            filled: false,
+        }
     }
 
     /// Makes the last evaluation the memory.
-    pub fn commit(&mut self, elapsed: N) {
+    #[inline(always)]
+    pub fn commit<S: Span<N>>(&mut self, moment: &Moment<S>) {
         self.argument = self.now.0;
         self.held = self.now.1;
         if !self.past.is_empty() && self.follow != Follow::Held {
-            self.past.push((elapsed, self.now.0));
+            self.past.push((moment.elapsed(), self.now.0));
         }
     }
 
@@ -103,9 +169,7 @@ impl<N: Number> Cell<N> {
         value
     }
 
-    #[inline(always)]
-    pub fn lag(&mut self, w: N, tau: N, moment: &Moment<N>) -> N {
-        let zero = N::lift(0.0);
+    pub fn lag<S: Span<N>>(&mut self, w: N, tau: N, moment: &Moment<S>) -> N {
         if !self.filled {
             self.filled = true;
             self.held = w;
@@ -115,24 +179,39 @@ impl<N: Number> Cell<N> {
             // A held input may have jumped: what follows is linear from the new value.
             self.argument = w;
         }
-        let tau = tau.max(zero);
-        let since = moment.since;
-        let safe = since.where_positive(since, N::lift(1.0));
-        // Below a thousandth of the time gone the exponential is zero; the time constant then acts by the slope alone.
-        let ratio = since.div(tau.max(safe.scale(1e-3)));
-        let decay = ratio.neg().call(Function::Exp);
-        let slope_tau = w.sub(self.argument).div(safe).mul(tau);
-        let start = self.held.sub(self.argument).add(slope_tau);
-        let moved = w.sub(slope_tau).add(start.mul(decay));
-        let still = self.held.where_positive(tau, w);
-        let value = moved.where_positive(since, still);
+        let tau = tau.max(N::lift(0.0));
+        let value = if moment.since.value() > 0.0 {
+            let gone = self.decay(moment.since, tau);
+            let slope_tau = w.sub(self.argument).mul(gone.ratio);
+            let start = self.held.sub(self.argument).add(slope_tau);
+            w.sub(slope_tau).add(start.mul(gone.decay))
+        } else {
+            self.held.where_positive(tau, w)
+        };
         self.now = (w, value);
         value
     }
 
-    pub fn delay(&mut self, w: N, seconds: N, moment: &Moment<N>) -> N {
+    /// A time constant does not change in a run, so what a plain length of time does is kept.
+    #[inline(always)]
+    fn decay<S: Span<N>>(&mut self, since: S, tau: N) -> Decay<N> {
+        if !S::PLAIN {
+            return Decay::new(since, tau);
+        }
+        let wanted = since.value();
+        match self.decays {
+            [Some(known), _] | [_, Some(known)] if known.since == wanted => return known,
+            _ => {}
+        }
+        let new = Decay::new(since, tau);
+        self.decays = [Some(new), self.decays[0]];
+        new
+    }
+
+    pub fn delay<S: Span<N>>(&mut self, w: N, seconds: N, moment: &Moment<S>) -> N {
+        let elapsed = moment.elapsed();
         if self.past.is_empty() {
-            self.past.push((moment.elapsed, w));
+            self.past.push((elapsed, w));
             self.argument = w;
         }
         if moment.phase == Phase::Start {
@@ -140,35 +219,49 @@ impl<N: Number> Cell<N> {
             if self.follow == Follow::Held {
                 // The same start may be tried again with a shorter step.
                 match self.past.last_mut() {
-                    Some(last) if last.0.value() >= moment.elapsed.value() => *last = (moment.elapsed, w),
-                    _ => self.past.push((moment.elapsed, w)),
+                    Some(last) if last.0.value() >= elapsed.value() => *last = (elapsed, w),
+                    _ => self.past.push((elapsed, w)),
                 }
             }
         }
         let seconds = seconds.max(N::lift(0.0));
         self.now = (w, w);
+        let since = moment.since.seconds();
         if self.follow == Follow::Held && moment.step.value() > 0.0 {
-            return self.mean_of_held(seconds, moment);
+            return self.mean_of_held(elapsed.sub(since).sub(seconds), moment.step.seconds());
         }
-        let target = moment.elapsed.sub(seconds);
-        let committed = moment.elapsed.sub(moment.since);
+        let target = elapsed.sub(seconds);
+        let committed = elapsed.sub(since);
         if self.follow != Follow::Held && target.value() >= committed.value() {
             // Within the step that is tried.
-            let since = moment.since;
             if since.value() <= 0.0 {
-                return self.before(target, w, moment.elapsed);
+                return self.before(target, w, elapsed);
             }
             let share = target.sub(committed).div(since);
             return self.argument.add(w.sub(self.argument).mul(share));
         }
-        self.before(target, w, moment.elapsed)
+        self.before(target, w, elapsed)
     }
 
-    /// The mean of the held argument over the step, `seconds` ago.
-    fn mean_of_held(&self, seconds: N, moment: &Moment<N>) -> N {
-        let start = moment.elapsed.sub(moment.since).sub(seconds);
-        let end = start.add(moment.step);
-        let from = self.past.partition_point(|p| p.0.value() < start.value()).saturating_sub(1);
+    /// How many of the past's times the test holds for, where it holds up to some time.
+    #[inline(always)]
+    fn count(&mut self, test: impl Fn(f64) -> bool) -> usize {
+        // Times go on, so the last answer is near.
+        let mut next = self.hint.min(self.past.len());
+        while self.past.get(next).is_some_and(|p| test(p.0.value())) {
+            next += 1;
+        }
+        while next > 0 && !self.past.get(next - 1).is_some_and(|p| test(p.0.value())) {
+            next -= 1;
+        }
+        self.hint = next;
+        next
+    }
+
+    /// The mean of the held argument over `length` from `start`.
+    fn mean_of_held(&mut self, start: N, length: N) -> N {
+        let end = start.add(length);
+        let from = self.count(|time| time < start.value()).saturating_sub(1);
         let mut sum = N::lift(0.0);
         for (i, (time, w)) in self.past.iter().enumerate().skip(from) {
             if time.value() > end.value() {
@@ -186,12 +279,12 @@ impl<N: Number> Cell<N> {
         if self.past.first().is_some_and(|p| p.0.value() > end.value()) {
             return self.past.first().map_or(sum, |p| p.1);
         }
-        sum.div(moment.step)
+        sum.div(length)
     }
 
     /// The argument at a time before the last commit.
-    fn before(&self, target: N, w: N, now: N) -> N {
-        let next = self.past.partition_point(|p| p.0.value() <= target.value());
+    fn before(&mut self, target: N, w: N, now: N) -> N {
+        let next = self.count(|time| time <= target.value());
         let (Some(a), b) = (next.checked_sub(1).and_then(|i| self.past.get(i)), self.past.get(next)) else {
             // At rest before the first sample.
             return self.past.first().map_or(w, |p| p.1);

@@ -3,18 +3,26 @@
 mod accuracy;
 mod compile;
 mod differentiate;
+mod drive;
+mod events;
 mod graph;
-mod integrate;
 mod linearise;
+mod lockstep;
+mod machine;
 mod many;
 mod memory;
 mod program;
 mod run;
+mod simulate;
+mod sliding;
 mod surface;
+mod trajectory;
+mod vector;
 
 pub use accuracy::StepCheck;
 pub use compile::Compiled;
+pub use drive::{DataError, Drive};
 pub use linearise::Linearisation;
-pub use run::{DataError, Direction, Drive, Injection, Observer, Response, Run, Sensitivity, Slot, Start};
+pub use run::{Direction, Injection, Observer, Response, Run, Sensitivity, Slot, Start};
 
-pub(crate) use run::column;
+pub(crate) use drive::column;

@@ -6,7 +6,7 @@
 use super::graph::{Node, NodeId};
 use super::memory::{Cell, Moment};
 use crate::expr::Function;
-use crate::number::Number;
+use crate::number::{Number, Span};
 
 #[derive(Debug, Clone, Copy)]
 enum Op {
@@ -16,6 +16,7 @@ enum Op {
     Div(u32, u32),
     Neg(u32),
     Square(u32),
+    Cube(u32),
     PowI(u32, i32),
     Pow(u32, u32),
     Call(Function, u32),
@@ -62,6 +63,7 @@ fn op(node: Node) -> Option<Op> {
         Node::Div(a, b) => Op::Div(a, b),
         Node::Neg(a) => Op::Neg(a),
         Node::PowI(a, 2) => Op::Square(a),
+        Node::PowI(a, 3) => Op::Cube(a),
         Node::PowI(a, n) => Op::PowI(a, n),
         Node::Pow(a, b) => Op::Pow(a, b),
         Node::Call(Function::Abs, a) => Op::Abs(a),
@@ -156,9 +158,20 @@ impl Program {
         Some(Op::Sum(from, self.terms.len() as u32 - from))
     }
 
+    /// Whether there is nothing to do.
+    pub fn is_empty(&self) -> bool {
+        self.ops.is_empty()
+    }
+
     /// Runs over the registers; `cells` are the operators' memories as of `moment`.
+    #[inline(never)]
+    pub fn run<N: Number, S: Span<N>>(&self, registers: &mut [N], cells: &mut [Cell<N>], moment: &Moment<S>) {
+        self.run_here(registers, cells, moment);
+    }
+
+    /// As [`Program::run`], compiled into the caller for its instruction set.
     #[inline(always)]
-    pub fn run<N: Number>(&self, registers: &mut [N], cells: &mut [Cell<N>], moment: &Moment<N>) {
+    pub fn run_here<N: Number, S: Span<N>>(&self, registers: &mut [N], cells: &mut [Cell<N>], moment: &Moment<S>) {
         for &(to, op) in &self.ops {
             let r = |i: u32| registers[i as usize];
             let y = match op {
@@ -168,6 +181,7 @@ impl Program {
                 Op::Div(a, b) => r(a).div(r(b)),
                 Op::Neg(a) => r(a).neg(),
                 Op::Square(a) => r(a).mul(r(a)),
+                Op::Cube(a) => r(a).mul(r(a).mul(r(a))),
                 Op::PowI(a, n) => r(a).powi(n),
                 Op::Pow(a, b) => r(a).pow(r(b)),
                 Op::Call(f, a) => r(a).call(f),
