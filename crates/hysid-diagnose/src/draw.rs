@@ -1,6 +1,6 @@
 //! Fills a [`Picture`]: the series that a report draws, read off the fitted simulations. Nothing is decided here.
 
-use hysid_plant::{Expr, Simulation};
+use hysid_plant::{Expr, Simulation, Unit};
 use hysid_signal::power_spectrum;
 
 use crate::base::Base;
@@ -62,7 +62,7 @@ pub(crate) fn picture(s: &Sitting<'_, '_>) -> Picture {
 }
 
 fn unit_of(column: &str) -> String {
-    column.split_once('_').map(|(_, unit)| unit.to_owned()).unwrap_or_default()
+    Unit::of_column(column).map(|unit| unit.to_string()).unwrap_or_default()
 }
 
 /// One entry for each stretch and output; gaps are `NaN`.

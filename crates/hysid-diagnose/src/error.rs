@@ -57,6 +57,14 @@ pub enum DiagnoseError {
         /// Its value.
         value: f64,
     },
+    /// Inputs that never change, where a clone of the simulator must be found.
+    #[error("{recording}: `{columns}` never changes: what the simulator makes of its input cannot be seen")]
+    NothingDrives {
+        /// The recording.
+        recording: String,
+        /// The inputs.
+        columns: String,
+    },
     /// The same file as estimation and hold-out.
     #[error("{0}: given as --recording and as --holdout; the hold-out must be data that the estimation never sees")]
     SameData(String),

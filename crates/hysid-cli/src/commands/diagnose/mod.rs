@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context;
+use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 
@@ -98,6 +99,13 @@ fn work(args: &Args) -> Result<(), Failure> {
             let stand_in =
                 stand_in(&args.input, &output, column, &intake.estimation, args.seed).map_err(Failure::bad_input)?;
             let mut outcome = answer(&stand_in.simulation, column, &intake, options, &hooks)?;
+            if let Some(moved) = stand_in.moved(&outcome.file.calibrated_parameters) {
+                if outcome.file.verdict == VerdictKind::NoSignificantMismatch {
+                    outcome.file.summary = format!("{} {moved}", outcome.file.summary);
+                } else {
+                    outcome.file.notes.insert(0, moved);
+                }
+            }
             outcome.file.notes.insert(0, stand_in.note);
             (outcome, folder)
         }

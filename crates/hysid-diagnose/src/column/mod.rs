@@ -1,20 +1,33 @@
 //! Column mode: the user's simulator is known by the column that it wrote, not by its equations.
 //!
-//! The column is a noise-free response, so a clone of it is identified first: first order, second order, two second orders in a row, each
-//! calibrated globally. The best clone takes the simulation's place if it follows the column closely. A mere parameter error of the user's
+//! The column is a noise-free response, so a clone of it is identified first: static, first order, integrating, second order, two second
+//! orders in a row, each calibrated globally. The smallest clone that follows, else the best one, takes the simulation's place if it follows the column closely. A mere parameter error of the user's
 //! simulator is then a parameter error of the clone, not missing physics. Where no clone follows, the column itself is the simulation, with
 //! a gain and an offset, and only what stands at the output or beside the plant can be told.
 
-use hysid_plant::{Compiled, Data, Simulation};
+mod clones;
+
+use hysid_plant::{BinaryOp, Compiled, Data, Expr, Simulation};
 use hysid_signal::{Channel, Recording};
 
 use crate::bootstrap::rms;
 use crate::calibrate::calibrated_copy;
 use crate::data::DataSet;
 use crate::error::DiagnoseError;
+use crate::file::ParameterRecord;
+use crate::text::number;
+use clones::{Wanted, meaning, quoted};
 
 /// A clone is taken where its error is below this share of the column's rms about its mean.
 const CLOSE: f64 = 0.03;
+/// No larger clone is tried where the error is below this share: a column has so many digits.
+const EXACT: f64 = 1e-3;
+/// A parameter that moves by less than this share is not spoken of.
+const NOTICED: f64 = 0.005;
+/// Samples that a clone is identified from.
+const MOST_SAMPLES: usize = 6000;
+/// The time column: there is no simulation file that names another.
+const TIME: &str = "t_s";
 
 /// What stands for the user's simulator.
 #[derive(Debug, Clone)]
@@ -23,6 +36,8 @@ pub struct StandIn {
     pub simulation: Simulation,
     /// What the user must know about it.
     pub note: String,
+    /// Whether a clone was found; else the column itself is the simulation.
+    pub clone: bool,
 }
 
 /// A simulation that stands for the column `simulated`, found on the estimation recordings.
@@ -37,7 +52,6 @@ pub fn stand_in(
     seed: u64,
 ) -> Result<StandIn, DiagnoseError> {
     let Some(first) = recordings.first() else { return Err(DiagnoseError::NoRecording) };
-    let period_s = first.clock().period_s;
     // Of a signal about its mean; 0 for one that never changes.
     let size = |name: &str| -> Result<f64, DiagnoseError> {
         let channel: &Channel = first.channel(name).ok_or_else(|| DiagnoseError::MissingColumn {
@@ -63,37 +77,59 @@ pub fn stand_in(
         }
     }
     let scale = size(simulated)?;
-    let sizes = inputs.iter().map(|i| size(i)).collect::<Result<Vec<_>, _>>()?;
-    let gain = scale / sizes.first().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
+    let Some(&drive) = inputs.iter().map(|i| size(i)).collect::<Result<Vec<_>, _>>()?.iter().find(|s| **s > 0.0) else {
+        return Err(DiagnoseError::NothingDrives { recording: first.name().to_owned(), columns: inputs.join("`, `") });
+    };
+    let finite: Vec<f64> = first
+        .channel(simulated)
+        .into_iter()
+        .flat_map(|c| c.samples.iter().copied())
+        .filter(|x| x.is_finite())
+        .collect();
+    let mean = finite.iter().sum::<f64>() / finite.len().max(1) as f64;
+    let wanted = Wanted {
+        inputs,
+        column: simulated,
+        output,
+        time: TIME,
+        period_s: first.clock().period_s,
+        samples: first.len(),
+        gain: scale / drive,
+        mean,
+        scale,
+    };
     let mut best: Option<(f64, Simulation)> = None;
-    for text in clones(inputs, simulated, period_s, gain, first.len()) {
+    for text in wanted.texts() {
         let Ok(clone) = Simulation::parse(&text, "clone") else { continue };
         let free = clone.parameters.iter().filter(|p| !p.fixed).count();
-        let data = DataSet::new(&clone, recordings, free)?.within(6000);
+        let data = DataSet::new(&clone, recordings, free)?.within(MOST_SAMPLES);
         let Some((copy, error)) = calibrated_copy(&clone, &data, seed) else { continue };
         // A larger clone must be clearly better.
         if best.as_ref().is_none_or(|(e, _)| error < 0.7 * e) {
             best = Some((error, copy));
         }
+        if best.as_ref().is_some_and(|(e, _)| *e < EXACT * scale) {
+            break;
+        }
     }
-    if let Some((error, mut clone)) = best
+    if let Some((error, clone)) = best
         && error < CLOSE * scale
     {
-        for o in &mut clone.outputs {
-            o.column = output.to_owned();
-        }
         let note = format!(
             "the simulation is known by its column `{simulated}` only: a clone of it was identified ({:.2} % of the column's rms is left) and diagnosed in its place; \
              parameters are those of the clone, and errors before are those of the recalibrated clone",
             100.0 * error / scale
         );
-        return Ok(StandIn { simulation: clone, note });
+        return Ok(StandIn { simulation: in_place(clone, output, scale), note, clone: true });
     }
     let text = format!(
-        "title = \"Column {simulated}\"\n[time]\n{}\n[inputs]\ns = \"{simulated}\"\n[parameters]\ng = {{ value = 1.0, min = 0.2, max = 5.0 }}\no = {{ value = 0.0, min = {:e}, max = {:e} }}\n[outputs]\n\"{output}\" = \"g*s + o\"\n",
-        clock(period_s),
+        "title = {}\n[time]\ncolumn = {}\n[inputs]\ns = {}\n[parameters]\ng = {{ value = 1.0, min = 0.2, max = 5.0 }}\no = {{ value = 0.0, min = {:e}, max = {:e} }}\n[outputs]\n{} = \"g*s + o\"\n",
+        quoted(&format!("Column {simulated}")),
+        quoted(TIME),
+        quoted(simulated),
         -3.0 * scale,
-        3.0 * scale
+        3.0 * scale,
+        quoted(output)
     );
     let simulation = Simulation::parse(&text, "column")
         .map_err(|e| DiagnoseError::Simulation { file: simulated.to_owned(), problem: e.to_string() })?;
@@ -101,50 +137,55 @@ pub fn stand_in(
         "the simulation is known by its column `{simulated}` only, and no linear clone up to fourth order follows it: \
          effects inside the plant cannot be told apart, only what stands at the output can be named; a simulation file says more"
     );
-    Ok(StandIn { simulation, note })
+    Ok(StandIn { simulation, note, clone: false })
 }
 
-fn clock(period_s: f64) -> String {
-    format!("period_s = {period_s:e}")
+/// The calibrated clone as the measured column's simulation: its offset is the simulator's, and known.
+fn in_place(mut clone: Simulation, output: &str, scale: f64) -> Simulation {
+    let offset = clone.parameter("o").map_or(0.0, |p| p.value);
+    let none = offset.abs() < EXACT * scale;
+    if none {
+        clone.parameters.retain(|p| p.name != "o");
+    }
+    clone.parameters.iter_mut().filter(|p| p.name == "o").for_each(|p| p.fixed = true);
+    for o in &mut clone.outputs {
+        o.column = output.to_owned();
+        if let (true, Expr::Binary(BinaryOp::Add, inner, _)) = (none, &o.expression) {
+            o.expression = (**inner).clone();
+        }
+    }
+    clone
 }
 
-/// Clones in order of size.
-fn clones(inputs: &[String], column: &str, period_s: f64, gain: f64, samples: usize) -> Vec<String> {
-    let listed: String = inputs.iter().enumerate().map(|(i, c)| format!("u{} = \"{c}\"\n", i + 1)).collect();
-    let parameter = |name: &str, value: f64, low: f64, high: f64| {
-        format!("{name} = {{ value = {value:e}, min = {low:e}, max = {high:e} }}\n")
-    };
-    let gains: String =
-        (1..=inputs.len()).map(|i| parameter(&format!("g{i}"), gain, -1e3 * gain, 1e3 * gain)).collect();
-    let drive = (1..=inputs.len()).map(|i| format!("g{i}*u{i}")).collect::<Vec<_>>().join(" + ");
-    let head =
-        format!("title = \"Clone of {column}\"\n[time]\n{}\n[inputs]\n{listed}[parameters]\n{gains}", clock(period_s));
-    let length = samples as f64 * period_s;
-    let slow = std::f64::consts::TAU * 2.0 / length;
-    let fast = 1.5 / period_s;
-    let middle = (slow * fast).sqrt();
-    let tail = |y: &str| format!("[outputs]\n\"{column}\" = \"{y}\"\n");
-    vec![
-        format!(
-            "{head}{}[states]\nx = {{ derivative = \"w*({drive} - x)\", initial = \"free\" }}\n{}",
-            parameter("w", middle, slow, fast),
-            tail("x")
-        ),
-        format!(
-            "{head}{}{}[states]\nx = {{ derivative = \"v\", initial = \"free\" }}\nv = {{ derivative = \"w^2*({drive} - x) - 2*z*w*v\", initial = \"free\" }}\n{}",
-            parameter("w", middle, slow, fast),
-            parameter("z", 0.2, 1e-4, 5.0),
-            tail("x")
-        ),
-        format!(
-            "{head}{}{}{}{}[states]\nx = {{ derivative = \"v\", initial = \"free\" }}\nv = {{ derivative = \"w^2*({drive} - x) - 2*z*w*v\", initial = \"free\" }}\np = {{ derivative = \"q\", initial = \"free\" }}\nq = {{ derivative = \"w2^2*(x - p) - 2*z2*w2*q\", initial = \"free\" }}\n{}",
-            parameter("w", middle, slow, fast),
-            parameter("z", 0.2, 1e-4, 5.0),
-            parameter("w2", 2.0 * middle, slow, 3.0 * fast),
-            parameter("z2", 0.5, 1e-4, 5.0),
-            tail("p")
-        ),
-    ]
+impl StandIn {
+    /// The parameters in which the recording differs from what the simulator's column says, in a sentence; nothing where none does, or
+    /// where no clone was found.
+    pub fn moved(&self, calibrated: &[ParameterRecord]) -> Option<String> {
+        let several = self.simulation.inputs.len() > 1;
+        let parts: Vec<String> = calibrated
+            .iter()
+            .filter(|_| self.clone)
+            .filter_map(|r| {
+                let given = self.simulation.parameter(&r.name)?.value;
+                let outside = r.low.is_some_and(|l| given < l) || r.high.is_some_and(|h| given > h);
+                if !outside || (r.value - given).abs() < NOTICED * given.abs() {
+                    return None;
+                }
+                let unit = if r.unit.is_empty() || r.unit == "-" { String::new() } else { format!(" {}", r.unit) };
+                let which = if several && r.name.starts_with('g') { format!(" `{}`", r.name) } else { String::new() };
+                let change = 100.0 * (r.value / given - 1.0);
+                Some(format!(
+                    "{}{which} {} -> {}{unit} ({change:+.0} %)",
+                    meaning(&r.name),
+                    number(given),
+                    number(r.value)
+                ))
+            })
+            .collect();
+        (!parts.is_empty()).then(|| {
+            format!("Parameters of the simulator are not those of the recording: {}. This is a parameter error, no missing physics.", parts.join(", "))
+        })
+    }
 }
 
 /// Data of `hysid-plant` for each stretch.
