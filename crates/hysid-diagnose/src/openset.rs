@@ -10,7 +10,7 @@
 
 use hysid_linalg::Matrix;
 use hysid_plant::{Direction, Expr, Injection, Slot as Place};
-use hysid_select::{Options as Selecting, select};
+use hysid_select::{Criterion, Options as Selecting, PressForm, select};
 use rayon::prelude::*;
 
 use crate::base::Base;
@@ -242,7 +242,8 @@ pub fn correction(base: &Base<'_>) -> Option<OpenSet> {
     }
     let columns: Vec<Vec<f64>> = usable.iter().map(|&i| whitened[i].clone()).collect();
     let phi = Matrix::from_columns(&columns)?;
-    let selection = select(&phi, &r, &Selecting { max_terms: MOST_TERMS, ..Selecting::default() }).ok()?;
+    let criterion = Criterion::Press(PressForm::Exact);
+    let selection = select(&phi, &r, &Selecting { criterion, max_terms: MOST_TERMS, ..Selecting::default() }).ok()?;
     if selection.terms.is_empty() {
         return None;
     }

@@ -7,6 +7,8 @@ use crate::{Criterion, PressForm};
 pub(crate) struct Facts {
     pub terms: usize,
     pub samples: usize,
+    /// Columns that it was chosen from.
+    pub candidates: usize,
     /// Sum of squared residuals relative to y'y.
     pub sse: f64,
     /// Exact leave-one-out sum of squares relative to y'y.
@@ -24,7 +26,11 @@ pub(crate) fn value(criterion: &Criterion, f: Facts) -> f64 {
     let share = 1.0 - n / samples;
     match criterion {
         Criterion::Terms(_) | Criterion::ErrTolerance(_) => f.sse,
-        Criterion::Press(_) if share <= 0.0 => f64::INFINITY,
+        Criterion::Press(_) | Criterion::SearchedPress if share <= 0.0 => f64::INFINITY,
+        Criterion::SearchedPress => {
+            let price = ((f.candidates as f64).ln() - 1.0).max(0.0);
+            f.press + 2.0 * n * price * f.sse / (samples - n)
+        }
         Criterion::Press(PressForm::Exact) => f.press,
         Criterion::Press(PressForm::AsPrinted) => f.sse / share,
         Criterion::Press(PressForm::Squared) => f.sse / (share * share),
@@ -42,7 +48,7 @@ pub(crate) fn choose(criterion: &Criterion, values: &[f64], sse: &[f64]) -> usiz
         Criterion::Terms(n) => (*n).min(values.len()),
         Criterion::ErrTolerance(rho) => sse.iter().position(|s| s <= rho).map_or(values.len(), |i| i + 1),
         Criterion::Aic | Criterion::Bic => smallest(values, f64::NEG_INFINITY),
-        Criterion::Press(_) | Criterion::Blocks(_) => smallest(values, ROUNDING),
+        Criterion::Press(_) | Criterion::SearchedPress | Criterion::Blocks(_) => smallest(values, ROUNDING),
     }
 }
 

@@ -36,7 +36,11 @@ pub(crate) fn finish<C: Columns + ?Sized>(
         for k in (shortest..=chain_end).rev() {
             let search_sse = table.best[k - 1].sse.max(0.0);
             let mut facts = fit.facts(k, samples);
-            if pursuit && !matches!(options.criterion, Criterion::Press(crate::PressForm::Exact) | Criterion::Blocks(_))
+            if pursuit
+                && !matches!(
+                    options.criterion,
+                    Criterion::Press(crate::PressForm::Exact) | Criterion::SearchedPress | Criterion::Blocks(_)
+                )
             {
                 facts.sse = search_sse;
             }

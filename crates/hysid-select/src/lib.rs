@@ -4,7 +4,8 @@
 //! that makes its columns on the fly) that explain a target y, and says how it got there:
 //!
 //! - [`Options::search`]: how subsets are looked for ([`Search`]);
-//! - [`Options::criterion`]: what decides their size ([`Criterion`]), leave-one-out PRESS unless told otherwise;
+//! - [`Options::criterion`]: what decides their size ([`Criterion`]), leave-one-out PRESS with the price of the search unless told
+//!   otherwise;
 //! - [`Selection`]: the columns in order, coefficients, each [`Step`] with its error reduction ratio, the criterion
 //!   against the number of terms ([`Selection::curve`]), why it stopped, what was rejected, and whether the arithmetic
 //!   was good enough ([`Precision`]).

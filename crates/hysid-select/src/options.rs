@@ -50,6 +50,14 @@ pub enum Criterion {
     ErrTolerance(f64),
     /// The smallest leave-one-out error.
     Press(PressForm),
+    /// The smallest leave-one-out error with the price of the search: PRESS + 2 n (ln M - 1) SSE / (N - n) for n terms out of M
+    /// candidates. The default.
+    ///
+    /// PRESS asks of a term that it pays for one coefficient, about 2 sigma^2. The best of M columns that have nothing to do
+    /// with the target takes out about 2 ln(M) sigma^2 all the same, so that PRESS lets chance in where there are many
+    /// candidates. This is the risk inflation criterion (Foster and George, *Ann. Statist.* 22 (1994) 1947) on PRESS.
+    /// Without noise it is PRESS.
+    SearchedPress,
     /// The smallest sum of squared errors on blocks of rows that the coefficients were not fitted to, each block left
     /// out once. For time series, whose neighbouring samples are no independent witnesses; blocks may be whole recordings.
     /// Rows in no block always take part in the fit.
@@ -82,7 +90,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             search: Search::Floating,
-            criterion: Criterion::Press(PressForm::Exact),
+            criterion: Criterion::SearchedPress,
             max_terms: 30,
             forced: Vec::new(),
             pivot_guard: 1e-11,

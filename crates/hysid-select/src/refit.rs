@@ -24,6 +24,8 @@ pub(crate) struct Refit {
     /// Sum of squared errors on left-out blocks; NaN where not asked for.
     pub blocks: Vec<f64>,
     pub condition: Vec<f64>,
+    /// Columns that these were chosen from.
+    candidates: usize,
     /// R of the columns and the target, column-major.
     factor: Vec<f64>,
 }
@@ -64,7 +66,7 @@ impl Refit {
     /// What is known of the first `k` columns.
     pub fn facts(&self, k: usize, samples: usize) -> Facts {
         let (sse, press, blocks) = (self.sse[k - 1], self.press[k - 1], self.blocks[k - 1]);
-        Facts { terms: k, samples, sse, press, blocks }
+        Facts { terms: k, samples, candidates: self.candidates, sse, press, blocks }
     }
 
     /// The criterion for 1, 2, ... columns.
@@ -115,7 +117,7 @@ pub(crate) fn refit<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize], 
         Goal::Samples => vec![f64::NAN; n],
         Goal::Blocks(blocks) => left_out_blocks(phi, y, columns, &r, &blocks).iter().map(|b| b / energy).collect(),
     };
-    Refit { err, sse, press, blocks, condition, factor: r }
+    Refit { err, sse, press, blocks, condition, candidates: phi.cols(), factor: r }
 }
 
 /// Rows of Q, and with them the residual and 1 - h of every sample, for the first 1, 2, ... columns.

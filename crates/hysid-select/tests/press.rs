@@ -42,8 +42,39 @@ proptest! {
     }
 
     #[test]
-    fn the_default_stops_at_the_smallest_press((phi, y) in problem()) {
+    fn the_rows_of_the_hat_matrix_sum_up_to_the_number_of_terms((phi, y) in problem(), terms in 1usize..6) {
+        // With H the projection on the columns, H e_t leaves 1 - h_tt of a target that is 1 at sample t and 0 elsewhere.
+        let options = Options { search: Search::Greedy, criterion: Criterion::Terms(terms), ..Options::default() };
+        let s = select(&phi, &y, &options).unwrap();
+        let again = Options { forced: s.terms.clone(), ..options };
+        let unit = |t: usize| (0..y.len()).map(|i| f64::from(u8::from(i == t))).collect::<Vec<_>>();
+        let leverage: Vec<f64> = (0..y.len()).map(|t| 1.0 - select(&phi, &unit(t), &again).unwrap().sse()).collect();
+        prop_assert!((leverage.iter().sum::<f64>() - terms as f64).abs() < 1e-9);
+        prop_assert!(leverage.iter().all(|h| (-1e-12..=1.0 + 1e-12).contains(h)));
+        // And PRESS is made of exactly these: e_t / (1 - h_tt).
+        let left = |t: usize| y[t] - s.terms.iter().zip(&s.theta).map(|(&j, c)| c * phi.get(t, j)).sum::<f64>();
+        let press: f64 = (0..y.len()).map(|t| (left(t) / (1.0 - leverage[t])).powi(2)).sum();
+        let found = s.steps.last().unwrap().press * s.target_energy;
+        prop_assert!((press - found).abs() < 1e-8 * found, "{press} {found}");
+    }
+
+    #[test]
+    fn the_price_of_the_search_is_that_of_its_candidates((phi, y) in problem()) {
         let options = Options { search: Search::Greedy, ..Options::default() };
+        let s = select(&phi, &y, &options).unwrap();
+        for (k, p) in s.curve.iter().enumerate() {
+            let (n, rows) = ((k + 1) as f64, y.len() as f64);
+            let value = p.press + 2.0 * n * ((phi.cols() as f64).ln() - 1.0) * p.sse / (rows - n);
+            prop_assert!((p.criterion - value).abs() < 1e-12 * value);
+        }
+        let least = s.curve.iter().map(|p| p.criterion).fold(f64::INFINITY, f64::min);
+        prop_assert_eq!(s.steps.last().unwrap().criterion, least);
+    }
+
+    #[test]
+    fn press_stops_at_its_smallest((phi, y) in problem()) {
+        let criterion = Criterion::Press(PressForm::Exact);
+        let options = Options { search: Search::Greedy, criterion, ..Options::default() };
         let s = select(&phi, &y, &options).unwrap();
         let least = s.curve.iter().map(|p| p.press).fold(f64::INFINITY, f64::min);
         prop_assert_eq!(s.steps.last().unwrap().press, least);

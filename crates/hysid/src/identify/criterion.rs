@@ -5,7 +5,6 @@
 
 use hysid_dictionary::{Design, Dictionary, Record};
 use hysid_narx::{Bank, Derived, Fit, Refine};
-use hysid_select::PressForm;
 
 use super::IdentifyError;
 use super::desk::Desk;
@@ -28,7 +27,7 @@ pub(crate) fn by_criterion(
 ) -> Result<Option<Stage>, IdentifyError> {
     let criterion = match desk.options.criterion {
         Criterion::FreeRun => return Ok(None),
-        Criterion::Press => hysid_select::Criterion::Press(PressForm::Exact),
+        Criterion::Press => hysid_select::Criterion::SearchedPress,
         Criterion::Aic => hysid_select::Criterion::Aic,
         Criterion::Bic => hysid_select::Criterion::Bic,
         Criterion::Err(e) => hysid_select::Criterion::ErrTolerance(e),

@@ -30,7 +30,7 @@ pub enum Criterion {
     /// The free run on held-out blocks.
     #[default]
     FreeRun,
-    /// Leave-one-out error of one step ahead.
+    /// Leave-one-out error of one step ahead, with the price of the search ([`hysid_select::Criterion::SearchedPress`]).
     Press,
     /// Akaike's criterion, one step ahead.
     Aic,
