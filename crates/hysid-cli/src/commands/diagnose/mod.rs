@@ -65,13 +65,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     {
         return Err(Failure::BadInput(format!("--time-limit is {limit}; allowed is a number of seconds above zero")));
     }
-    let threads = match args.threads {
-        Some(n) if !(1..=MOST_THREADS).contains(&n) => {
-            return Err(Failure::BadInput(format!("--threads is {n}; allowed is 1 to {MOST_THREADS}")));
-        }
-        Some(n) => n,
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    if let Some(n) = args.threads
+        && !(1..=MOST_THREADS).contains(&n)
+    {
+        return Err(Failure::BadInput(format!("--threads is {n}; allowed is 1 to {MOST_THREADS}")));
+    }
+    let threads = args.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("starting the threads")?;
     pool.install(|| work(args))
 }
@@ -83,7 +82,7 @@ fn work(args: &Args) -> Result<(), Failure> {
     let expired = || args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > limit);
     let hooks = Hooks { progress: &progress, expired: &expired };
     let files = Files { estimation: &args.recording, holdout: &args.holdout };
-    let (outcome, folder) = match (&args.simulation, &args.simulated) {
+    let (mut outcome, folder) = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
             let (simulation, name) = simulation_file::read(file)?;
             let intake = files.of_simulation(&simulation)?;
@@ -113,6 +112,12 @@ fn work(args: &Args) -> Result<(), Failure> {
             return Err(Failure::BadInput("give a simulation file, or --simulated with --input and --output".into()));
         }
     };
+    if let Some(limit) = args.time_limit.filter(|_| expired()) {
+        outcome.file.notes.push(format!(
+            "the time limit of {limit} s was reached: steps that refine the verdict (further effects, held-out blocks, an experiment, a correction, a black box) \
+             were left out, and the result depends on the machine"
+        ));
+    }
 
     let page = hysid_report::diagnosis::page(&outcome.file, &outcome.picture, &crate::provenance());
     folder.text("report.html", &page)?;
@@ -140,9 +145,7 @@ fn answer(
 ) -> Result<Diagnosis, Failure> {
     let request = Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, options };
     let mut outcome = diagnose(&request, hooks).map_err(|e| refused(&e, &request))?;
-    if (hooks.expired)() {
-        outcome.file.notes.push("the time limit was reached: no black box was identified beside the simulation".into());
-    } else {
+    if !(hooks.expired)() {
         (hooks.progress)("identifying a black box for comparison");
         black_box::score(&mut outcome.file, &outcome.picture, simulation, intake, options.seed);
     }
