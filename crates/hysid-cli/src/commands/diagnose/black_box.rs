@@ -11,21 +11,29 @@ use hysid_diagnose::file::DiagnosisFile;
 use hysid_diagnose::picture::{Picture, RecordPicture, Role};
 use hysid_narx::NarxModel;
 use hysid_plant::Simulation;
-use hysid_signal::{Channel, Recording};
+use hysid_signal::{Channel, Clock, Recording};
 
 use super::intake::{Intake, SAME_PERIOD};
 
 /// A model whose run through whole recordings is worse than this many times the error it had on pieces is not sound.
 const SOUND: f64 = 3.0;
+/// Longer recordings than this in all are used in the windows of the diagnosis: memory and time stay what they are.
+const MOST_SAMPLES: usize = 30_000;
+/// Samples of a window that is worth it.
+const SHORTEST: usize = 100;
 
 /// Fills `rmse_black_box` of the hold-out's entries; a note says why it is missing.
 pub fn score(file: &mut DiagnosisFile, picture: &Picture, simulation: &Simulation, intake: &Intake, seed: u64) {
     let held: Vec<&RecordPicture> = picture.records.iter().filter(|r| r.role == Role::HoldOut).collect();
     let blocks = intake.holdout.is_empty();
-    let (estimation, holdout) = if blocks {
-        (without_blocks(&intake.estimation, &held, simulation), &intake.estimation)
+    let holdout = if blocks { &intake.estimation } else { &intake.holdout };
+    let samples: usize = intake.estimation.iter().map(Recording::len).sum();
+    let estimation = if samples > MOST_SAMPLES {
+        windows(&intake.estimation, picture)
+    } else if blocks {
+        without_blocks(&intake.estimation, &held, simulation)
     } else {
-        (intake.estimation.clone(), &intake.holdout)
+        intake.estimation.clone()
     };
     // Two symbols may stand for one column.
     let columns: BTreeSet<&String> = simulation.inputs.iter().map(|i| &i.column).collect();
@@ -139,6 +147,33 @@ fn error(record: &RecordPicture, prediction: &[f64], diverged_at: Option<usize>)
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
+/// The windows of long recordings that the diagnosis itself worked on.
+fn windows(recordings: &[Recording], picture: &Picture) -> Vec<Recording> {
+    let mut out: Vec<Recording> = Vec::new();
+    let mut seen = BTreeSet::new();
+    for record in picture.records.iter().filter(|r| r.role == Role::Estimation) {
+        let Some(recording) = recordings.get(record.place) else { continue };
+        for run in record.samples.chunk_by(|a, b| b - a <= 1) {
+            let (Some(&from), Some(&to)) = (run.first(), run.last()) else { continue };
+            // Each output has the same windows, but for its own gaps.
+            if to < from + SHORTEST || !seen.insert((record.place, from)) {
+                continue;
+            }
+            let channels = recording
+                .channels()
+                .iter()
+                .map(|c| Channel {
+                    name: c.name.clone(),
+                    samples: c.samples[from..=to.min(c.samples.len() - 1)].to_vec(),
+                })
+                .collect();
+            let clock = Clock { start_s: recording.clock().time(from), ..recording.clock() };
+            out.extend(Recording::new(recording.name(), clock, channels));
+        }
+    }
+    out
+}
+
 /// The recordings with the outputs of the held-out samples missing.
 fn without_blocks(recordings: &[Recording], held: &[&RecordPicture], simulation: &Simulation) -> Vec<Recording> {
     let outputs: Vec<&str> = simulation.outputs.iter().map(|o| o.column.as_str()).collect();
@@ -199,6 +234,21 @@ mod tests {
         assert_eq!(error(&r, &y, None), Some((25.0f64 / 3.0).sqrt()));
         assert_eq!(error(&r, &[nan; 10], Some(4)), None);
         assert_eq!(error(&r, &[nan; 10], None), None);
+    }
+
+    #[test]
+    fn a_long_recording_is_learnt_from_in_windows() {
+        let ramp: Vec<f64> = (0..1000).map(f64::from).collect();
+        let clock = hysid_signal::Clock { start_s: 5.0, period_s: 0.1 };
+        let r = Recording::new("r.csv", clock, vec![Channel { name: "y".into(), samples: ramp }]).unwrap();
+        let samples: Vec<usize> = (0..200).chain(300..310).chain(700..900).collect();
+        let n = samples.len();
+        let mut used = record(samples, vec![false; n], vec![0.0; n]);
+        used.role = Role::Estimation;
+        let picture = Picture { records: vec![used.clone(), used], ..Picture::default() };
+        let found = windows(&[r], &picture);
+        assert_eq!(found.len(), 2);
+        assert_eq!((found[1].len(), found[1].channels()[0].samples[0], found[1].clock().start_s), (200, 700.0, 75.0));
     }
 
     #[test]
