@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use hysid_plant::{Compiled, Direction, Initial, Run, Simulation, Start};
+use hysid_plant::{Compiled, Direction, Initial, Run, Sensitivity, Simulation, Start};
 use rayon::prelude::*;
 
 use crate::data::DataSet;
@@ -246,25 +246,22 @@ impl<'d> Model<'d> {
 
     /// The derivatives of the stacked prediction by some of the unknowns (places in `theta`), with the prediction itself.
     pub fn tangents(&self, theta: &[f64], places: &[usize]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        self.tangents_with(theta, places, &[])
+        self.tangents_with(theta, places, &[Vec::new()]).pop().flatten()
     }
 
-    /// As [`Model::tangents`], with some fixed parameters at other values.
+    /// As [`Model::tangents`], for each of several settings of fixed parameters: run together they cost little more than one.
     pub fn tangents_with(
         &self,
         theta: &[f64],
         places: &[usize],
-        set: &[(String, f64)],
-    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        let parameters = self.parameters(theta, set);
-        let rows = self.data.rows();
-        let mut prediction = vec![0.0; rows];
-        let mut columns = vec![vec![0.0; rows]; places.len()];
+        settings: &[Vec<(String, f64)>],
+    ) -> Vec<Option<(Vec<f64>, Vec<Vec<f64>>)>> {
+        let parameters: Vec<Vec<f64>> = settings.iter().map(|set| self.parameters(theta, set)).collect();
         let runs: Vec<_> = (0..self.data.stretches.len())
             .into_par_iter()
             .map(|s| {
                 let start = self.start_of(s, theta);
-                let run = self.run_of(s, &parameters, &start);
+                let runs: Vec<Run<'_>> = parameters.iter().map(|p| self.run_of(s, p, &start)).collect();
                 let mut directions = Vec::new();
                 let mut wanted = Vec::new();
                 for (c, &place) in places.iter().enumerate() {
@@ -280,10 +277,22 @@ impl<'d> Model<'d> {
                         Unknown::Initial { .. } => {}
                     }
                 }
-                (self.compiled.sensitivities(&run, &directions), wanted)
+                (self.compiled.sensitivities_many(&runs, &directions), wanted)
             })
             .collect();
-        for (s, (sensitivity, wanted)) in runs.iter().enumerate() {
+        (0..settings.len()).map(|i| self.stacked(places.len(), runs.iter().map(|(all, c)| (&all[i], c)))).collect()
+    }
+
+    /// The stacked prediction with its derivatives, from a run of each stretch with the columns that its tangents belong to.
+    fn stacked<'r>(
+        &self,
+        columns: usize,
+        runs: impl Iterator<Item = (&'r Sensitivity, &'r Vec<usize>)>,
+    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+        let rows = self.data.rows();
+        let mut prediction = vec![0.0; rows];
+        let mut columns = vec![vec![0.0; rows]; columns];
+        for (s, (sensitivity, wanted)) in runs.enumerate() {
             if sensitivity.response.diverged.is_some() {
                 return None;
             }
@@ -305,21 +314,28 @@ impl<'d> Model<'d> {
         Some((prediction, columns))
     }
 
-    /// The stacked tangent response to a signal added at a place, one series for each stretch; `None` where it is not finite.
-    pub fn response_to(&self, theta: &[f64], place: hysid_plant::Slot, series: &[Vec<f64>]) -> Option<Vec<f64>> {
+    /// The stacked tangent responses to signals, each added at a place by itself (one series for each stretch); `None` where
+    /// one is not finite.
+    pub fn responses_to(&self, theta: &[f64], signals: &[(hysid_plant::Slot, &[Vec<f64>])]) -> Vec<Option<Vec<f64>>> {
         let parameters = self.parameters(theta, &[]);
-        let mut outputs = Vec::new();
-        for (s, signal) in series.iter().enumerate() {
+        let mut outputs = vec![Vec::new(); signals.len()];
+        for s in 0..self.data.stretches.len() {
             let start = self.start_of(s, theta);
             let run = self.run_of(s, &parameters, &start);
-            let mut sensitivity = self.compiled.sensitivities(&run, &[crate::openset::direction(place, signal)]);
+            let directions: Vec<Direction<'_>> = signals
+                .iter()
+                .map(|(place, series)| {
+                    crate::openset::direction(*place, series.get(s).map(Vec::as_slice).unwrap_or_default())
+                })
+                .collect();
+            let sensitivity = self.compiled.sensitivities(&run, &directions);
             if sensitivity.response.diverged.is_some() {
-                return None;
+                return vec![None; signals.len()];
             }
-            outputs.push(sensitivity.tangents.pop()?);
+            outputs.iter_mut().zip(sensitivity.tangents).for_each(|(all, tangent)| all.push(tangent));
         }
-        let stack = self.data.stack(&outputs);
-        stack.iter().all(|x| x.is_finite()).then_some(stack)
+        let stack = |outputs: Vec<Outputs>| Some(self.data.stack(&outputs)).filter(|s| s.iter().all(|x| x.is_finite()));
+        outputs.into_iter().map(stack).collect()
     }
 
     /// The simulation with these values in it (initial values stay as the document has them).

@@ -48,6 +48,9 @@ pub struct OpenSet {
     pub block_ratio: f64,
 }
 
+/// Signals that are pushed through the simulation's tangent together.
+const TOGETHER: usize = 8;
+
 /// Most terms of a correction.
 const MOST_TERMS: usize = 8;
 
@@ -210,10 +213,17 @@ fn terms(base: &Base<'_>) -> Vec<Term> {
             }
         }
     }
-    work.into_par_iter()
-        .filter_map(|(place, slot, side, text, kind, series)| {
-            let column = model.response_to(&base.fit.theta, place, &series)?;
-            Some(Term { text, kind, side, slot, column })
+    let columns: Vec<Option<Vec<f64>>> = work
+        .par_chunks(TOGETHER)
+        .flat_map_iter(|work| {
+            let signals: Vec<_> = work.iter().map(|(place, .., series)| (*place, series.as_slice())).collect();
+            model.responses_to(&base.fit.theta, &signals)
+        })
+        .collect();
+    work.into_iter()
+        .zip(columns)
+        .filter_map(|((_, slot, side, text, kind, _), column)| {
+            Some(Term { text, kind, side, slot, column: column? })
         })
         .collect()
 }

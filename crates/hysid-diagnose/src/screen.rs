@@ -17,6 +17,9 @@ use crate::slot::{Slot, Structure};
 /// Points of a candidate whose columns take part in the mismatch test.
 pub const KEPT: usize = 6;
 
+/// Points of a shape grid that are simulated together.
+const TOGETHER: usize = 8;
+
 /// One joint point of a candidate's shape grids.
 #[derive(Debug, Clone)]
 pub struct Point {
@@ -222,15 +225,16 @@ fn features(
         theta[p] = 0.0;
     }
     let every = starts.len().div_ceil(KEPT);
-    for (i, shapes) in starts.into_iter().enumerate() {
-        let Some((_, columns)) = model.tangents_with(&theta, &places, &shapes) else { continue };
+    let together = starts.chunks(TOGETHER).flat_map(|some| model.tangents_with(&theta, &places, some));
+    for (i, (shapes, tangents)) in starts.iter().zip(together).enumerate() {
+        let Some((_, columns)) = tangents else { continue };
         let Some(group) = FeatureGroup::new(&columns, &data.layout, &base.whitener, own) else { continue };
         let amplitudes =
             screening.amplitudes.iter().map(|a| a.name.clone()).zip(group.amplitudes(r, columns.len())).collect();
         let score = score(total, group.explained(r), r.len(), group.columns.len());
         let (concealment, norm) = (group.concealment, group.norm);
         points.push(Point {
-            shapes,
+            shapes: shapes.clone(),
             group: (i % every == every / 2).then_some(group),
             concealment,
             norm,

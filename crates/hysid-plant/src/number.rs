@@ -94,6 +94,7 @@ pub(crate) trait Number: Copy + Send + Sync + std::fmt::Debug + 'static {
     fn neg(self) -> Self;
     fn scale(self, factor: f64) -> Self;
     fn call(self, function: Function) -> Self;
+    fn abs(self) -> Self;
     fn powi(self, n: i32) -> Self;
     fn pow(self, exponent: Self) -> Self;
     fn atan2(self, other: Self) -> Self;
@@ -252,6 +253,12 @@ impl<const L: usize, const T: usize> Lanes<L, T> {
         Self { v: each(|l| if test[l] { self.v[l] } else { other.v[l] }), d }
     }
 
+    /// The values of all lanes.
+    #[inline(always)]
+    pub fn values(&self) -> &[f64; L] {
+        &self.v
+    }
+
     /// One lane by itself.
     pub fn lane(&self, lane: usize) -> Lanes<1, T> {
         let mut d = [[0.0]; T];
@@ -331,6 +338,13 @@ impl<const L: usize, const T: usize> Number for Lanes<L, T> {
             (v[l], slope[l]) = value_and_slope(function, self.v[l]);
         }
         self.chain(v, slope)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        if T == 0 {
+            return Self { v: each(|l| self.v[l].abs()), d: [[0.0; L]; T] };
+        }
+        self.chain(each(|l| self.v[l].abs()), each(|l| sign(self.v[l])))
     }
     #[inline(always)]
     fn powi(self, n: i32) -> Self {

@@ -26,6 +26,9 @@ pub struct Compiled {
     pub(super) derivatives: Vec<NodeId>,
     pub(super) initials: Vec<Option<NodeId>>,
     pub(super) outputs: Vec<NodeId>,
+    /// 0, 1, ... up to the number of states: loops over these are over one state at a time. (Over a range the compiler
+    /// takes several states at once and gathers their lanes from memory, which is slower by far.)
+    pub(super) state_numbers: Vec<usize>,
     /// What rests on parameters only: run once.
     pub(super) prologue: Program,
     /// What the state derivatives need of inputs, time and operators on them, once for each moment.
@@ -139,6 +142,7 @@ impl Compiled {
             memories: Program::new(&nodes, memory_nodes.into_iter().filter(|&id| !stimulated(id)), constant),
             measure: Program::new(&nodes, outputs.iter().copied(), constant),
             simulation: simulation.clone(),
+            state_numbers: (0..simulation.states.len()).collect(),
             has_delay: nodes.iter().any(|n| matches!(n, Node::Delay(..))),
             plain_surfaces: surfaces.iter().all(|s| s.state.is_some()),
             surfaces,

@@ -12,6 +12,8 @@ use crate::number::{Single, Span};
 
 /// Most events in one step; what is beyond is integrated across.
 const MAX_EVENTS: usize = 12;
+/// How near to a crossing the search goes, as a share of the step's way across; Newton's correction squares it.
+const NEAR: f64 = 1e-6;
 
 impl<N: Single> Machine<'_, N> {
     pub fn set_mode(&mut self, surface: usize, mode: Mode) {
@@ -168,6 +170,14 @@ impl<N: Single> Machine<'_, N> {
         released
     }
 
+    /// As [`Machine::advance`], where a step of that length has been tried in vain and `distances` are those at its end.
+    pub fn advance_through_events(&mut self, tau: f64, h: f64, distances: impl Iterator<Item = f64>) {
+        self.distances.clear();
+        self.distances.extend(distances);
+        self.tau = N::lift(tau);
+        self.go_through_events(h);
+    }
+
     /// Goes on by `h` from `self.tau`; `distances` are those at the end of a step of that length, tried in vain.
     fn go_through_events(&mut self, h: f64) {
         let mut rest = N::lift(h);
@@ -291,7 +301,8 @@ impl<N: Single> Machine<'_, N> {
             let secant = (low * at_high - high * at_low) / (at_high - at_low);
             let middle = if i % 8 == 7 || !(secant > low && secant < high) { 0.5 * (low + high) } else { secant };
             let (value, which) = self.nearest(middle, whole, &fired);
-            if value.abs() < 1e-14 {
+            let near = if self.modes[which] == Mode::Stuck { 1e-14 } else { NEAR };
+            if value.abs() < near {
                 return Some((middle, which));
             }
             if value > 0.0 {

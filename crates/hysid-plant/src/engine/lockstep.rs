@@ -110,14 +110,25 @@ impl<'a, const L: usize, const T: usize> Lockstep<'a, L, T> {
             self.together.step(tau, h);
             fired = self.fired(tau, h);
             for lane in (0..L).filter(|&l| fired[l]) {
-                self.leave(lane);
+                self.leave(lane, tau, h);
             }
             self.together.accept(tau, h);
         }
         for lane in 0..self.alone.len() {
-            if fired[lane] || self.lanes[lane] == Lane::Apart {
-                self.advance_alone(lane, tau, h);
+            if self.lanes[lane] == Lane::Apart {
+                self.follow(lane);
+                self.alone[lane].advance(tau, h);
             }
+            if fired[lane] || self.lanes[lane] == Lane::Apart {
+                self.come_back(lane);
+            }
+        }
+    }
+
+    /// Makes the present sample that of a lane's own machine.
+    fn follow(&mut self, lane: usize) {
+        if self.alone[lane].n != self.together.n {
+            self.alone[lane].go_to(self.together.n);
         }
     }
 
@@ -134,13 +145,11 @@ impl<'a, const L: usize, const T: usize> Lockstep<'a, L, T> {
             model.switches.run(&mut machine.registers, &mut machine.cells, &moment);
         }
         let mut fired = [false; L];
-        for (surface, sigma) in model.surfaces.iter().zip(&machine.sigma) {
-            let argument = match surface.state {
-                Some(i) if model.plain_surfaces => machine.trial[i as usize],
-                _ => machine.registers[surface.argument as usize],
-            };
-            for (lane, fired) in fired.iter_mut().enumerate() {
-                *fired |= sigma.value_of(lane) * argument.value_of(lane) < 0.0;
+        for (i, sigma) in machine.sigma.iter().enumerate() {
+            let argument = machine.argument(i);
+            let (sigma, argument) = (sigma.values(), argument.values());
+            for lane in 0..L {
+                fired[lane] |= sigma[lane] * argument[lane] < 0.0;
             }
         }
         for (fired, lane) in fired.iter_mut().zip(&self.lanes) {
@@ -149,9 +158,10 @@ impl<'a, const L: usize, const T: usize> Lockstep<'a, L, T> {
         fired
     }
 
-    /// Hands a lane's state to its own machine.
+    /// Hands a lane that has crossed a surface to its own machine, which moves it.
     #[inline(never)]
-    fn leave(&mut self, lane: usize) {
+    fn leave(&mut self, lane: usize, tau: f64, h: f64) {
+        self.follow(lane);
         let (together, alone) = (&self.together, &mut self.alone[lane]);
         for (own, x) in alone.x.iter_mut().zip(&together.x) {
             *own = x.lane(lane);
@@ -159,16 +169,15 @@ impl<'a, const L: usize, const T: usize> Lockstep<'a, L, T> {
         for (own, cell) in alone.cells.iter_mut().zip(&together.cells) {
             *own = cell.lane(lane);
         }
+        let sigma = together.sigma.iter().enumerate();
+        let distances = sigma.map(|(i, sigma)| sigma.value_of(lane) * together.argument(i).value_of(lane));
+        alone.advance_through_events(tau, h, distances);
     }
 
-    /// Moves a lane by its own machine, and takes it back where no surface is stuck.
+    /// Takes a lane back from its own machine where no surface is stuck.
     #[inline(never)]
-    fn advance_alone(&mut self, lane: usize, tau: f64, h: f64) {
-        let (together, alone) = (&mut self.together, &mut self.alone[lane]);
-        if alone.n != together.n {
-            alone.go_to(together.n);
-        }
-        alone.advance(tau, h);
+    fn come_back(&mut self, lane: usize) {
+        let (together, alone) = (&mut self.together, &self.alone[lane]);
         if alone.any_stuck {
             self.lanes[lane] = Lane::Apart;
             return;
@@ -189,6 +198,18 @@ impl<'a, const L: usize, const T: usize> Lockstep<'a, L, T> {
             // A stuck lane is not moved here; its sign only must not fire.
             let sign = if *mode == Mode::Stuck { 0.0 } else { mode.sign() };
             *sigma = sigma.with_value(lane, sign);
+        }
+    }
+}
+
+impl<const L: usize, const T: usize> Machine<'_, Lanes<L, T>> {
+    /// The argument of a surface at `trial`.
+    #[inline(always)]
+    fn argument(&self, surface: usize) -> Lanes<L, T> {
+        let nodes = &self.model.surfaces[surface];
+        match nodes.state {
+            Some(i) if self.model.plain_surfaces => self.trial[i as usize],
+            _ => self.registers[nodes.argument as usize],
         }
     }
 }

@@ -4,7 +4,7 @@
 
 use super::Compiled;
 use super::memory::{Cell, Follow, Moment, Phase};
-use super::run::{Direction, Run, Slot, Start};
+use super::run::{Direction, Injection, Run, Slot, Start};
 use super::surface::Mode;
 use super::vector::Width;
 use crate::document::{Hold, Initial};
@@ -16,11 +16,22 @@ struct Added<'a> {
     series: &'a [f64],
     /// The tangent that it is; none where it is a value.
     tangent: Option<usize>,
+    /// Its value at the present sample, and its slope from there.
+    level: f64,
+    slope: f64,
 }
 
-impl Added<'_> {
-    fn at(&self, n: usize) -> f64 {
-        self.series.get(n).copied().filter(|x| x.is_finite()).unwrap_or(0.0)
+impl<'a> Added<'a> {
+    fn new(injection: &Injection<'a>, tangent: Option<usize>) -> Self {
+        Self { slot: injection.slot, series: injection.series, tangent, level: 0.0, slope: 0.0 }
+    }
+
+    #[inline(always)]
+    fn to<N: Number, S: Span<N>>(&self, value: N, tau: S) -> N {
+        match self.tangent {
+            None => value.add(tau.line(self.level, self.slope)),
+            Some(k) => value.add_tangent(k, self.level + self.slope * tau.value()),
+        }
     }
 }
 
@@ -93,9 +104,9 @@ impl<'a, N: Number> Machine<'a, N> {
             (true, Hold::Zero) => Follow::Held,
         };
         let cells = model.delay_of_input.iter().map(|&of_input| Cell::new(follow(of_input))).collect();
-        let values = run.injections.iter().map(|i| Added { slot: i.slot, series: i.series, tangent: None });
+        let values = run.injections.iter().map(|i| Added::new(i, None));
         let tangents = directions.iter().enumerate().filter_map(|(k, d)| match d {
-            Direction::Injection(i) => Some(Added { slot: i.slot, series: i.series, tangent: Some(k) }),
+            Direction::Injection(i) => Some(Added::new(i, Some(k))),
             _ => None,
         });
         let mut machine = Self {
@@ -167,6 +178,12 @@ impl<'a, N: Number> Machine<'a, N> {
                 self.lines.push(Line { register, level, slope });
             }
         }
+        let mut added = std::mem::take(&mut self.added);
+        for added in &mut added {
+            let at = |n: usize| added.series.get(n).copied().filter(|x| x.is_finite()).unwrap_or(0.0);
+            (added.level, added.slope) = self.between(at);
+        }
+        self.added = added;
     }
 
     /// `since` the last commit, on the way through a step; `tau` after the present sample.
@@ -185,15 +202,8 @@ impl<'a, N: Number> Machine<'a, N> {
         (value, slope)
     }
 
-    pub fn added_at<S: Span<N>>(&self, slot: Slot, tau: S, mut value: N) -> N {
-        for added in self.added.iter().filter(|a| a.slot == slot) {
-            let (level, slope) = self.between(|n| added.at(n));
-            value = match added.tangent {
-                None => value.add(tau.line(level, slope)),
-                Some(k) => value.add_tangent(k, level + slope * tau.value()),
-            };
-        }
-        value
+    fn added_to<S: Span<N>>(&self, slot: Slot, tau: S, value: N) -> N {
+        self.added.iter().filter(|a| a.slot == slot).fold(value, |value, added| added.to(value, tau))
     }
 
     /// Sets the registers of inputs and time, `tau` after the present sample.
@@ -206,7 +216,7 @@ impl<'a, N: Number> Machine<'a, N> {
         if !self.added.is_empty() {
             for &(register, i) in &model.input_leaves {
                 let value = self.registers[register as usize];
-                self.registers[register as usize] = self.added_at(Slot::Input(i), tau, value);
+                self.registers[register as usize] = self.added_to(Slot::Input(i), tau, value);
             }
         }
         if let Some(register) = model.time_leaf {
@@ -241,14 +251,13 @@ impl<'a, N: Number> Machine<'a, N> {
         self.take_derivatives(moment, out);
     }
 
-    #[inline(always)]
     fn take_derivatives<S: Span<N>>(&self, moment: &Moment<S>, out: &mut [N]) {
         for (to, &register) in out.iter_mut().zip(&self.model.derivatives) {
             *to = self.registers[register as usize];
         }
         if !self.added.is_empty() {
             for (i, to) in out.iter_mut().enumerate() {
-                *to = self.added_at(Slot::State(i), moment.tau, *to);
+                *to = self.added_to(Slot::State(i), moment.tau, *to);
             }
         }
     }
@@ -265,9 +274,72 @@ impl<'a, N: Number> Machine<'a, N> {
         }
     }
 
-    /// The body of [`Machine::step`], for each instruction set.
+    /// The body of [`Machine::step`] for each instruction set, where no surface is stuck.
     #[inline(always)]
     pub fn step_here<S: Span<N>>(&mut self, tau: S, h: S) {
+        self.set_signs();
+        let Self { model, registers, cells, stages, x, trial, lines, added, .. } = self;
+        let (x, trial) = (x.as_slice(), trial.as_mut_slice());
+        let (zero, half) = (h.part(0.0), h.part(0.5));
+        let drive = self.run.drive;
+        let sample_s = drive.period_s * self.n as f64;
+        for &i in &model.state_numbers {
+            registers[i] = x[i];
+        }
+        for s in 0..4 {
+            let (since, phase) = match s {
+                0 => (zero, Phase::Start),
+                3 => (h, Phase::Inside),
+                _ => (half, Phase::Inside),
+            };
+            let moment = Moment { sample_s, tau: tau.plus(since), since, step: h, phase };
+            // The third stage is at the moment of the second.
+            if s != 2 {
+                for line in lines.iter() {
+                    registers[line.register as usize] = moment.tau.line(line.level, line.slope);
+                }
+                if !added.is_empty() {
+                    for &(register, i) in &model.input_leaves {
+                        for added in added.iter().filter(|a| a.slot == Slot::Input(i)) {
+                            registers[register as usize] = added.to(registers[register as usize], moment.tau);
+                        }
+                    }
+                }
+                if let Some(register) = model.time_leaf {
+                    registers[register as usize] = moment.tau.line(drive.start_s + sample_s, 1.0);
+                }
+                model.stimulus.run_here(registers, cells, &moment);
+            }
+            model.flow.run_here(registers, cells, &moment);
+            let k = stages[s].as_mut_slice();
+            for &i in &model.state_numbers {
+                k[i] = registers[model.derivatives[i] as usize];
+            }
+            if !added.is_empty() {
+                for added in added.iter() {
+                    if let Slot::State(i) = added.slot
+                        && let Some(k) = k.get_mut(i)
+                    {
+                        *k = added.to(*k, moment.tau);
+                    }
+                }
+            }
+            if s < 3 {
+                let next = if s == 2 { h } else { half };
+                for &i in &model.state_numbers {
+                    registers[i] = x[i].add(next.times(k[i]));
+                }
+            }
+        }
+        let [k1, k2, k3, k4] = stages;
+        for &i in &model.state_numbers {
+            trial[i] = weighted(x[i], h, [k1[i], k2[i], k3[i], k4[i]]);
+        }
+    }
+
+    /// As [`Machine::step_here`], where a surface is stuck.
+    #[inline(never)]
+    pub fn step_stuck<S: Span<N>>(&mut self, tau: S, h: S) {
         let mut stages = std::mem::take(&mut self.stages);
         let x = std::mem::take(&mut self.x);
         self.set_states(&x);
@@ -279,32 +351,20 @@ impl<'a, N: Number> Machine<'a, N> {
                 _ => (half, Phase::Inside),
             };
             let moment = self.moment(tau.plus(since), since, h, phase);
-            // The third stage is at the moment of the second.
             if s != 2 {
-                self.set_inputs(tau.plus(since));
-                self.model.stimulus.run_here(&mut self.registers, &mut self.cells, &moment);
+                self.stimulate(&moment);
             }
-            if self.any_stuck {
-                self.stuck_flow(&moment, k);
-            } else {
-                self.set_signs();
-                self.model.flow.run_here(&mut self.registers, &mut self.cells, &moment);
-                self.take_derivatives(&moment, k);
-            }
+            self.stuck_flow(&moment, k);
             if s < 3 {
                 let next = if s == 2 { h } else { half };
-                for ((to, x), k) in self.registers.iter_mut().zip(&x).zip(k.iter()) {
-                    *to = x.add(next.times(*k));
+                for &i in &self.model.state_numbers {
+                    self.registers[i] = x[i].add(next.times(k[i]));
                 }
             }
         }
-        let sixth = h.part(1.0 / 6.0);
         let [k1, k2, k3, k4] = &stages;
-        let all = self.trial.iter_mut().zip(&x).zip(k1).zip(k2).zip(k3).zip(k4);
-        for (((((to, x), k1), k2), k3), k4) in all {
-            let middle = k2.add(*k3);
-            let sum = k1.add(middle.add(middle)).add(*k4);
-            *to = x.add(sixth.times(sum));
+        for &i in &self.model.state_numbers {
+            self.trial[i] = weighted(x[i], h, [k1[i], k2[i], k3[i], k4[i]]);
         }
         self.stages = stages;
         self.x = x;
@@ -341,7 +401,15 @@ impl<'a, N: Number> Machine<'a, N> {
     pub fn measure_here(&mut self, moment: &Moment<f64>, y: &mut [N]) {
         self.model.measure.run(&mut self.registers, &mut self.cells, moment);
         for (j, (y, &register)) in y.iter_mut().zip(&self.model.outputs).enumerate() {
-            *y = self.added_at(Slot::Output(j), 0.0, self.registers[register as usize]);
+            *y = self.added_to(Slot::Output(j), 0.0, self.registers[register as usize]);
         }
     }
+}
+
+/// The end of a Runge-Kutta step from its four slopes.
+#[inline(always)]
+fn weighted<N: Number, S: Span<N>>(x: N, h: S, [k1, k2, k3, k4]: [N; 4]) -> N {
+    let middle = k2.add(k3);
+    let sum = k1.add(middle.add(middle)).add(k4);
+    x.add(h.part(1.0 / 6.0).times(sum))
 }

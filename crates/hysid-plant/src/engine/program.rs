@@ -172,45 +172,54 @@ impl Program {
     /// As [`Program::run`], compiled into the caller for its instruction set.
     #[inline(always)]
     pub fn run_here<N: Number, S: Span<N>>(&self, registers: &mut [N], cells: &mut [Cell<N>], moment: &Moment<S>) {
+        // The result is stored in each arm: behind the `match` it would go through memory twice.
+        macro_rules! r {
+            ($i:expr) => {
+                registers[$i as usize]
+            };
+        }
         for &(to, op) in &self.ops {
-            let r = |i: u32| registers[i as usize];
-            let y = match op {
-                Op::Add(a, b) => r(a).add(r(b)),
-                Op::Sub(a, b) => r(a).sub(r(b)),
-                Op::Mul(a, b) => r(a).mul(r(b)),
-                Op::Div(a, b) => r(a).div(r(b)),
-                Op::Neg(a) => r(a).neg(),
-                Op::Square(a) => r(a).mul(r(a)),
-                Op::Cube(a) => r(a).mul(r(a).mul(r(a))),
-                Op::PowI(a, n) => r(a).powi(n),
-                Op::Pow(a, b) => r(a).pow(r(b)),
-                Op::Call(f, a) => r(a).call(f),
-                Op::Abs(a) => r(a).call(Function::Abs),
-                Op::Atan2(a, b) => r(a).atan2(r(b)),
-                Op::Min(a, b) => r(a).min(r(b)),
-                Op::Max(a, b) => r(a).max(r(b)),
+            match op {
+                Op::Add(a, b) => r!(to) = r!(a).add(r!(b)),
+                Op::Sub(a, b) => r!(to) = r!(a).sub(r!(b)),
+                Op::Mul(a, b) => r!(to) = r!(a).mul(r!(b)),
+                Op::Div(a, b) => r!(to) = r!(a).div(r!(b)),
+                Op::Neg(a) => r!(to) = r!(a).neg(),
+                Op::Square(a) => r!(to) = r!(a).mul(r!(a)),
+                Op::Cube(a) => r!(to) = r!(a).mul(r!(a).mul(r!(a))),
+                Op::PowI(a, n) => r!(to) = r!(a).powi(n),
+                Op::Pow(a, b) => r!(to) = r!(a).pow(r!(b)),
+                Op::Call(f, a) => r!(to) = r!(a).call(f),
+                Op::Abs(a) => r!(to) = r!(a).abs(),
+                Op::Atan2(a, b) => r!(to) = r!(a).atan2(r!(b)),
+                Op::Min(a, b) => r!(to) = r!(a).min(r!(b)),
+                Op::Max(a, b) => r!(to) = r!(a).max(r!(b)),
                 Op::Sum(from, count) => {
                     let (from, count) = (from as usize, count as usize);
-                    let mut sum = N::lift(0.0);
-                    for (i, term) in self.terms[from..from + count].iter().enumerate() {
-                        sum = match *term {
-                            // The first is taken as it is: adding it to 0 would lose the sign of a zero.
-                            Term::Plus(a) if i == 0 => r(a),
-                            Term::PlusProduct(a, b) if i == 0 => r(a).mul(r(b)),
-                            Term::Plus(a) => sum.add(r(a)),
-                            Term::Minus(a) => sum.sub(r(a)),
-                            Term::PlusProduct(a, b) => sum.add(r(a).mul(r(b))),
-                            Term::MinusProduct(a, b) => sum.sub(r(a).mul(r(b))),
-                        };
+                    let mut terms = self.terms[from..from + count].iter();
+                    // The first is taken as it is: adding it to 0 would lose the sign of a zero.
+                    let mut sum = match terms.next() {
+                        Some(&(Term::PlusProduct(a, b) | Term::MinusProduct(a, b))) => r!(a).mul(r!(b)),
+                        Some(&(Term::Plus(a) | Term::Minus(a))) => r!(a),
+                        None => N::lift(0.0),
+                    };
+                    for term in terms {
+                        match *term {
+                            Term::Plus(a) => sum = sum.add(r!(a)),
+                            Term::Minus(a) => sum = sum.sub(r!(a)),
+                            Term::PlusProduct(a, b) => sum = sum.add(r!(a).mul(r!(b))),
+                            Term::MinusProduct(a, b) => sum = sum.sub(r!(a).mul(r!(b))),
+                        }
                     }
-                    sum
+                    r!(to) = sum;
                 }
-                Op::Play(w, half_width, cell) => cells[cell as usize].play(r(w), r(half_width)),
-                Op::Relay(w, lower, upper, cell) => cells[cell as usize].relay(r(w), r(lower), r(upper)),
-                Op::Lag(w, tau, cell) => cells[cell as usize].lag(r(w), r(tau), moment),
-                Op::Delay(w, seconds, cell) => cells[cell as usize].delay(r(w), r(seconds), moment),
-            };
-            registers[to as usize] = y;
+                Op::Play(w, half_width, cell) => r!(to) = cells[cell as usize].play(r!(w), r!(half_width)),
+                Op::Relay(w, lower, upper, cell) => {
+                    r!(to) = cells[cell as usize].relay(r!(w), r!(lower), r!(upper));
+                }
+                Op::Lag(w, tau, cell) => r!(to) = cells[cell as usize].lag(r!(w), r!(tau), moment),
+                Op::Delay(w, seconds, cell) => r!(to) = cells[cell as usize].delay(r!(w), r!(seconds), moment),
+            }
         }
     }
 }

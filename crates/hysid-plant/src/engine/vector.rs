@@ -35,6 +35,9 @@ impl<N: Number> Machine<'_, N> {
     /// the state derivatives are those of [`Machine::stuck_flow`].
     #[inline(always)]
     pub fn step<S: Span<N>>(&mut self, tau: S, h: S) {
+        if self.any_stuck {
+            return self.step_stuck(tau, h);
+        }
         #[cfg(target_arch = "x86_64")]
         if N::WIDE && S::PLAIN {
             match self.width {
