@@ -222,9 +222,7 @@ fn terms(base: &Base<'_>) -> Vec<Term> {
         .collect();
     work.into_iter()
         .zip(columns)
-        .filter_map(|((_, slot, side, text, kind, _), column)| {
-            Some(Term { text, kind, side, slot, column: column? })
-        })
+        .filter_map(|((_, slot, side, text, kind, _), column)| Some(Term { text, kind, side, slot, column: column? }))
         .collect()
 }
 
