@@ -11,8 +11,8 @@ use crate::document::{Hold, Initial};
 use crate::number::{Number, Span};
 
 /// A signal added at a slot, as value or as tangent.
-struct Added<'a> {
-    slot: Slot,
+pub(super) struct Added<'a> {
+    pub slot: Slot,
     series: &'a [f64],
     /// The tangent that it is; none where it is a value.
     tangent: Option<usize>,
@@ -27,7 +27,7 @@ impl<'a> Added<'a> {
     }
 
     #[inline(always)]
-    fn to<N: Number, S: Span<N>>(&self, value: N, tau: S) -> N {
+    pub fn to<N: Number, S: Span<N>>(&self, value: N, tau: S) -> N {
         match self.tangent {
             None => value.add(tau.line(self.level, self.slope)),
             Some(k) => value.add_tangent(k, self.level + self.slope * tau.value()),
@@ -37,10 +37,10 @@ impl<'a> Added<'a> {
 
 /// A signal's value at the present sample, and its slope from there.
 #[derive(Debug, Clone, Copy)]
-struct Line {
-    register: u32,
-    level: f64,
-    slope: f64,
+pub(super) struct Line {
+    pub register: u32,
+    pub level: f64,
+    pub slope: f64,
 }
 
 /// One run in progress, or one in each lane.
@@ -50,7 +50,7 @@ pub(super) struct Machine<'a, N> {
     pub run: &'a Run<'a>,
     pub hold: Hold,
     pub directions: usize,
-    added: Vec<Added<'a>>,
+    pub added: Vec<Added<'a>>,
     pub registers: Vec<N>,
     pub cells: Vec<Cell<N>>,
     pub modes: Vec<Mode>,
@@ -67,7 +67,7 @@ pub(super) struct Machine<'a, N> {
     /// Whether a surface is stuck, and whether the signs' registers are those of the modes.
     pub any_stuck: bool,
     pub sigma_set: bool,
-    lines: Vec<Line>,
+    pub lines: Vec<Line>,
     pub distances: Vec<f64>,
     pub width: Width,
 }
@@ -274,118 +274,6 @@ impl<'a, N: Number> Machine<'a, N> {
         }
     }
 
-    /// The body of [`Machine::step`] for each instruction set, where no surface is stuck.
-    #[inline(always)]
-    pub fn step_here<S: Span<N>>(&mut self, tau: S, h: S) {
-        self.set_signs();
-        let Self { model, registers, cells, stages, x, trial, lines, added, .. } = self;
-        let (x, trial) = (x.as_slice(), trial.as_mut_slice());
-        let (zero, half) = (h.part(0.0), h.part(0.5));
-        let drive = self.run.drive;
-        let sample_s = drive.period_s * self.n as f64;
-        for &i in &model.state_numbers {
-            registers[i] = x[i];
-        }
-        for s in 0..4 {
-            let (since, phase) = match s {
-                0 => (zero, Phase::Start),
-                3 => (h, Phase::Inside),
-                _ => (half, Phase::Inside),
-            };
-            let moment = Moment { sample_s, tau: tau.plus(since), since, step: h, phase };
-            // The third stage is at the moment of the second.
-            if s != 2 {
-                for line in lines.iter() {
-                    registers[line.register as usize] = moment.tau.line(line.level, line.slope);
-                }
-                if !added.is_empty() {
-                    for &(register, i) in &model.input_leaves {
-                        for added in added.iter().filter(|a| a.slot == Slot::Input(i)) {
-                            registers[register as usize] = added.to(registers[register as usize], moment.tau);
-                        }
-                    }
-                }
-                if let Some(register) = model.time_leaf {
-                    registers[register as usize] = moment.tau.line(drive.start_s + sample_s, 1.0);
-                }
-                model.stimulus.run_here(registers, cells, &moment);
-            }
-            model.flow.run_here(registers, cells, &moment);
-            let k = stages[s].as_mut_slice();
-            for &i in &model.state_numbers {
-                k[i] = registers[model.derivatives[i] as usize];
-            }
-            if !added.is_empty() {
-                for added in added.iter() {
-                    if let Slot::State(i) = added.slot
-                        && let Some(k) = k.get_mut(i)
-                    {
-                        *k = added.to(*k, moment.tau);
-                    }
-                }
-            }
-            if s < 3 {
-                let next = if s == 2 { h } else { half };
-                for &i in &model.state_numbers {
-                    registers[i] = x[i].add(next.times(k[i]));
-                }
-            }
-        }
-        let [k1, k2, k3, k4] = stages;
-        for &i in &model.state_numbers {
-            trial[i] = weighted(x[i], h, [k1[i], k2[i], k3[i], k4[i]]);
-        }
-    }
-
-    /// As [`Machine::step_here`], where a surface is stuck.
-    #[inline(never)]
-    pub fn step_stuck<S: Span<N>>(&mut self, tau: S, h: S) {
-        let mut stages = std::mem::take(&mut self.stages);
-        let x = std::mem::take(&mut self.x);
-        self.set_states(&x);
-        let (zero, half) = (h.part(0.0), h.part(0.5));
-        for (s, k) in stages.iter_mut().enumerate() {
-            let (since, phase) = match s {
-                0 => (zero, Phase::Start),
-                3 => (h, Phase::Inside),
-                _ => (half, Phase::Inside),
-            };
-            let moment = self.moment(tau.plus(since), since, h, phase);
-            if s != 2 {
-                self.stimulate(&moment);
-            }
-            self.stuck_flow(&moment, k);
-            if s < 3 {
-                let next = if s == 2 { h } else { half };
-                for &i in &self.model.state_numbers {
-                    self.registers[i] = x[i].add(next.times(k[i]));
-                }
-            }
-        }
-        let [k1, k2, k3, k4] = &stages;
-        for &i in &self.model.state_numbers {
-            self.trial[i] = weighted(x[i], h, [k1[i], k2[i], k3[i], k4[i]]);
-        }
-        self.stages = stages;
-        self.x = x;
-    }
-
-    /// Accepts `trial` as the state, `h` after `tau`.
-    pub fn accept<S: Span<N>>(&mut self, tau: S, h: S) {
-        std::mem::swap(&mut self.x, &mut self.trial);
-        if !self.cells.is_empty() {
-            let moment = self.moment(tau.plus(h), h, h, Phase::Inside);
-            if !self.model.memories.is_empty() {
-                let x = std::mem::take(&mut self.x);
-                self.set_inputs(moment.tau);
-                self.set_states(&x);
-                self.model.memories.run(&mut self.registers, &mut self.cells, &moment);
-                self.x = x;
-            }
-            self.cells.iter_mut().for_each(|c| c.commit(&moment));
-        }
-    }
-
     /// Outputs at the present sample, where no surface is stuck.
     pub fn measure_freely(&mut self, y: &mut [N]) {
         let moment = self.moment(0.0, 0.0, 0.0, Phase::Start);
@@ -404,12 +292,4 @@ impl<'a, N: Number> Machine<'a, N> {
             *y = self.added_to(Slot::Output(j), 0.0, self.registers[register as usize]);
         }
     }
-}
-
-/// The end of a Runge-Kutta step from its four slopes.
-#[inline(always)]
-fn weighted<N: Number, S: Span<N>>(x: N, h: S, [k1, k2, k3, k4]: [N; 4]) -> N {
-    let middle = k2.add(k3);
-    let sum = k1.add(middle.add(middle)).add(k4);
-    x.add(h.part(1.0 / 6.0).times(sum))
 }

@@ -15,6 +15,7 @@ mod program;
 mod run;
 mod simulate;
 mod sliding;
+mod step;
 mod surface;
 mod trajectory;
 mod vector;

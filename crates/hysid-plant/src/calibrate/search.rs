@@ -1,0 +1,111 @@
+//! The search for the best start: from each of several, a homotopy from prediction to the free run on part of the data.
+
+use super::Data;
+use super::least_squares::{Limits, minimise};
+use super::noise::NoiseModel;
+use super::objective::Objective;
+use super::observer::rms_about_mean;
+use super::settings::Settings;
+use super::starts;
+use crate::engine::Compiled;
+
+/// Samples on which starts are compared.
+const SHORT: usize = 3000;
+
+impl Compiled {
+    /// The parameters of the best start after a short search on part of the data, and the simulations that took.
+    pub(super) fn search(
+        &self,
+        data: &[Data],
+        estimated: &[usize],
+        white: &[NoiseModel],
+        user: &[f64],
+        substeps: usize,
+        settings: &Settings,
+    ) -> (Option<Vec<f64>>, usize) {
+        let short: Vec<Data> = self.excerpts(data);
+        let Some(longest) = short.iter().max_by_key(|d| d.len()) else { return (None, 0) };
+        let designed = starts::design(self, estimated, 64, settings.seed);
+        let mut all = vec![user.to_vec()];
+        all.extend(starts::from_response(self, longest, estimated, &designed, 2, substeps));
+        all.extend(designed.iter().step_by(11).cloned());
+        let (lower, upper) = self.box_of(&short, estimated);
+        let mut simulations = 0;
+        let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
+        let samples: usize = short.iter().map(Data::len).sum::<usize>() * white.len();
+        let strengths: &[f64] = if self.simulation().is_static() { &[0.0] } else { &[1.0, 0.1, 0.01, 0.0] };
+        for theta in all {
+            let mut objective = Objective {
+                compiled: self,
+                data: &short,
+                estimated,
+                theta: theta.clone(),
+                substeps,
+                noise: white.to_vec(),
+                gains: None,
+                simulations: 0,
+            };
+            let mut p = self.point(&short, estimated, &theta, None);
+            let mut best = f64::INFINITY;
+            for &strength in strengths {
+                let now = objective.theta(&p);
+                let initial = objective.initial(&p);
+                objective.gains = (strength > 0.0).then(|| {
+                    let pairs = short.iter().zip(&initial);
+                    let gain = |(d, x): (&Data, &Vec<f64>)| {
+                        self.observer_gain(d, &now, &d.start_states(self, &now, x), strength)
+                    };
+                    pairs.map(gain).collect()
+                });
+                let last = strength == 0.0;
+                let limits =
+                    Limits { iterations: if last { 12 } else { 5 }, tolerance: if last { 1e-4 } else { 1e-2 } };
+                if let Some(minimum) = minimise(&p, &lower, &upper, limits, |p| objective.normal(p)) {
+                    p = minimum.p;
+                    if last {
+                        best = minimum.normal.cost;
+                    }
+                }
+            }
+            simulations += objective.simulations;
+            if best.is_finite() {
+                let theta = objective.theta(&p);
+                // Two starts that agree on the best so far, or an error far below the signal, end the search.
+                let agreed =
+                    found.iter().any(|(cost, known)| (best - cost).abs() <= 0.01 * cost && starts::same(known, &theta));
+                let least = found.iter().map(|(c, _)| *c).fold(best, f64::min);
+                found.push((best, theta));
+                let relative = (2.0 * least / samples as f64).sqrt();
+                if best <= 1.01 * least && (relative < 0.03 || (agreed && found.len() >= 2)) {
+                    break;
+                }
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        (found.into_iter().next().map(|(_, theta)| theta), simulations)
+    }
+
+    /// The stretches, or the liveliest windows of the longest two where they are long.
+    fn excerpts(&self, data: &[Data]) -> Vec<Data> {
+        if data.iter().map(Data::len).sum::<usize>() <= 2 * SHORT {
+            return data.to_vec();
+        }
+        let mut order: Vec<&Data> = data.iter().collect();
+        order.sort_by_key(|d| std::cmp::Reverse(d.len()));
+        let window = |d: &&Data| {
+            if d.len() <= SHORT {
+                return Some((*d).clone());
+            }
+            let power = |start: usize| -> f64 {
+                let parts = d.measured.iter().filter_map(|s| s.get(start..start + SHORT));
+                parts.map(rms_about_mean).sum()
+            };
+            let starts: Vec<usize> = (0..4).map(|k| k * (d.len() - SHORT) / 3).collect();
+            let first = power(0);
+            let best = starts.into_iter().max_by(|a, b| power(*a).total_cmp(&power(*b)))?;
+            // The start is better known than a window in the middle.
+            if first >= 0.5 * power(best) { Some(d.shortened(SHORT)) } else { d.part(self, best..best + SHORT) }
+        };
+        order.iter().take(2).filter_map(window).collect()
+    }
+}
