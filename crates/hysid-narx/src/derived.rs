@@ -9,6 +9,38 @@
 
 use crate::NarxError;
 
+/// What a play remembers when a recording begins.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Past {
+    /// It rests with the first sample.
+    #[default]
+    FirstSample,
+    /// The source had rested at this level (as a virgin or demagnetised machine at 0) and went straight to its first sample.
+    RestedAt(f64),
+    /// The source had turned at this level, after a long way to it, and went straight to its first sample.
+    TurnedAt(f64),
+}
+
+impl Past {
+    /// The play of half-width `r` just before the source goes to its `first` sample.
+    fn play(self, first: f64, r: f64) -> f64 {
+        match self {
+            Self::FirstSample => first,
+            Self::RestedAt(level) => level,
+            // On the way up from a turning point the play lies above the level, on the way down below.
+            Self::TurnedAt(level) if level <= first => level + r,
+            Self::TurnedAt(level) => level - r,
+        }
+    }
+
+    fn level(self) -> Option<f64> {
+        match self {
+            Self::FirstSample => None,
+            Self::RestedAt(level) | Self::TurnedAt(level) => Some(level),
+        }
+    }
+}
+
 /// What a derived input does with its source.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -17,9 +49,8 @@ pub enum Law {
     Play {
         /// Half-width, from 0.
         half_width: f64,
-        /// Where the source came from to its first sample: the level at which it had turned, after a long way to it. `None`: the
-        /// play rests with the first sample.
-        came_from: Option<f64>,
+        /// What it remembers at its first sample.
+        past: Past,
     },
     /// Rate-independent presliding friction from -1 to 1: dw = (sgn(dx) - w) |dx| / length, integrated exactly.
     Dahl {
@@ -56,10 +87,15 @@ impl Law {
     /// The law as the user reads it, with `x` for its source.
     pub fn describe(&self, x: &str) -> String {
         match self {
-            Self::Play { half_width, came_from: None } => format!("play({x}, {half_width:.6})"),
-            Self::Play { half_width, came_from: Some(level) } => {
-                format!("play({x}, {half_width:.6}), as if {x} had turned at {level:.6} before")
-            }
+            Self::Play { half_width, past } => match past {
+                Past::FirstSample => format!("play({x}, {half_width:.6})"),
+                Past::RestedAt(level) => {
+                    format!("play({x}, {half_width:.6}), as if {x} had rested at {level:.6} before")
+                }
+                Past::TurnedAt(level) => {
+                    format!("play({x}, {half_width:.6}), as if {x} had turned at {level:.6} before")
+                }
+            },
             Self::Dahl { length } => format!("presliding friction of {x} over {length:.6}"),
             Self::Filter { a } => {
                 let a: Vec<String> = a.iter().map(|v| format!("{v:.6}")).collect();
@@ -84,7 +120,7 @@ impl Law {
     /// The same law with these numbers, as [`Law::parameters`] gave them; `None` where they are not allowed.
     pub fn with_parameters(&self, p: &[f64]) -> Option<Self> {
         let law = match (self, p) {
-            (Self::Play { came_from, .. }, &[half_width]) => Self::Play { half_width, came_from: *came_from },
+            (Self::Play { past, .. }, &[half_width]) => Self::Play { half_width, past: *past },
             (Self::Dahl { .. }, &[l]) => Self::Dahl { length: l.exp() },
             (Self::Filter { a }, p) if p.len() == a.len() => Self::Filter { a: p.to_vec() },
             (Self::SoftThreshold { .. }, &[centre, w]) => Self::SoftThreshold { centre, width: w.exp() },
@@ -99,8 +135,8 @@ impl Law {
             Self::Play { half_width, .. } if !(half_width.is_finite() && *half_width >= 0.0) => {
                 Some(format!("half-width {half_width}; it must be a finite number of 0 or more"))
             }
-            Self::Play { came_from: Some(level), .. } if !level.is_finite() => {
-                Some(format!("came from {level}; it must be a finite number"))
+            Self::Play { past, .. } if past.level().is_some_and(|l| !l.is_finite()) => {
+                Some("its past is not a finite number".into())
             }
             Self::Dahl { length } if !(length.is_finite() && *length > 0.0) => {
                 Some(format!("length {length}; it must be a finite number above 0"))
@@ -117,13 +153,8 @@ impl Law {
     pub fn respond(&self, x: &[f64], out: &mut [f64]) {
         let Some(&first) = x.first() else { return };
         match self {
-            Self::Play { half_width, came_from } => {
-                let mut w = match *came_from {
-                    None => first,
-                    // On the way up from a turning point the play lies above the level, on the way down below.
-                    Some(level) if level <= first => level + half_width,
-                    Some(level) => level - half_width,
-                };
+            Self::Play { half_width, past } => {
+                let mut w = past.play(first, *half_width);
                 for (o, &x) in out.iter_mut().zip(x) {
                     w = hysid_hysteresis::play(w, x, *half_width);
                     *o = w;
@@ -232,18 +263,21 @@ mod tests {
         let x = [0.0, 0.2, 1.0, 0.9];
         // The law, and its answer to x.
         let cases = [
-            (None, [0.0, 0.0, 0.5, 0.5]),
+            (Past::FirstSample, [0.0, 0.0, 0.5, 0.5]),
+            // It had rested at 0.2; from 2 the first sample took it along.
+            (Past::RestedAt(0.2), [0.2, 0.2, 0.5, 0.5]),
+            (Past::RestedAt(2.0), [0.5, 0.5, 0.5, 0.5]),
             // It had turned at -0.4 with the play at 0.1.
-            (Some(-0.4), [0.1, 0.1, 0.5, 0.5]),
+            (Past::TurnedAt(-0.4), [0.1, 0.1, 0.5, 0.5]),
             // From far below the play lags behind, from far above it lies ahead.
-            (Some(-9.0), [-0.5, -0.3, 0.5, 0.5]),
-            (Some(9.0), [0.5, 0.5, 0.5, 0.5]),
+            (Past::TurnedAt(-9.0), [-0.5, -0.3, 0.5, 0.5]),
+            (Past::TurnedAt(9.0), [0.5, 0.5, 0.5, 0.5]),
         ];
-        for (came_from, expected) in cases {
+        for (past, expected) in cases {
             let mut out = [0.0; 4];
-            Law::Play { half_width: 0.5, came_from }.respond(&x, &mut out);
+            Law::Play { half_width: 0.5, past }.respond(&x, &mut out);
             for (a, b) in out.iter().zip(expected) {
-                assert!((a - b).abs() < 1e-14, "{came_from:?}: {out:?}");
+                assert!((a - b).abs() < 1e-14, "{past:?}: {out:?}");
             }
         }
     }
@@ -259,7 +293,7 @@ mod tests {
     #[test]
     fn parameters_return() {
         for law in [
-            Law::Play { half_width: 0.3, came_from: Some(-1.0) },
+            Law::Play { half_width: 0.3, past: Past::TurnedAt(-1.0) },
             Law::Dahl { length: 2.0 },
             Law::Filter { a: vec![-0.5, 0.2] },
             Law::SoftThreshold { centre: -1.0, width: 0.5 },
@@ -269,6 +303,6 @@ mod tests {
                 assert!((a - b).abs() < 1e-14);
             }
         }
-        assert!(Law::Play { half_width: 0.3, came_from: None }.with_parameters(&[-1.0]).is_none());
+        assert!(Law::Play { half_width: 0.3, past: Past::FirstSample }.with_parameters(&[-1.0]).is_none());
     }
 }

@@ -7,7 +7,7 @@ use hysid_io::{InputError, WriteError};
 use serde::{Deserialize, Serialize};
 
 use crate::model::{Coefficient, NoiseTerm, Parts};
-use crate::{Derived, Law, NarxError, NarxModel};
+use crate::{Derived, Law, NarxError, NarxModel, Past};
 
 /// The name of the format in the file.
 pub const MODEL_FORMAT: &str = "hysid.model";
@@ -45,7 +45,9 @@ enum FileLaw {
     Play {
         half_width: f64,
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        came_from: Option<f64>,
+        rested_at: Option<f64>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        turned_at: Option<f64>,
     },
     Dahl {
         length: f64,
@@ -130,7 +132,14 @@ fn to_file(parts: &Parts) -> FileModel {
         of: inputs[d.source].symbol.clone(),
         sign_threshold: n.threshold,
         law: match &d.law {
-            Law::Play { half_width, came_from } => FileLaw::Play { half_width: *half_width, came_from: *came_from },
+            Law::Play { half_width, past } => {
+                let (rested_at, turned_at) = match *past {
+                    Past::FirstSample => (None, None),
+                    Past::RestedAt(level) => (Some(level), None),
+                    Past::TurnedAt(level) => (None, Some(level)),
+                };
+                FileLaw::Play { half_width: *half_width, rested_at, turned_at }
+            }
             Law::Dahl { length } => FileLaw::Dahl { length: *length },
             Law::Filter { a } => FileLaw::Filter { a: a.clone() },
             Law::SoftThreshold { centre, width } => FileLaw::SoftThreshold { centre: *centre, width: *width },
@@ -171,7 +180,18 @@ fn from_file(file: FileModel) -> Result<Parts, NarxError> {
             return Err(NarxError::BadDerived { symbol: d.symbol, problem });
         };
         let law = match d.law {
-            FileLaw::Play { half_width, came_from } => Law::Play { half_width, came_from },
+            FileLaw::Play { half_width, rested_at, turned_at } => {
+                let past = match (rested_at, turned_at) {
+                    (None, None) => Past::FirstSample,
+                    (Some(level), None) => Past::RestedAt(level),
+                    (None, Some(level)) => Past::TurnedAt(level),
+                    (Some(_), Some(_)) => {
+                        let problem = "it has both `rested_at` and `turned_at`".into();
+                        return Err(NarxError::BadDerived { symbol: d.symbol, problem });
+                    }
+                };
+                Law::Play { half_width, past }
+            }
             FileLaw::Dahl { length } => Law::Dahl { length },
             FileLaw::Filter { a } => Law::Filter { a },
             FileLaw::SoftThreshold { centre, width } => Law::SoftThreshold { centre, width },

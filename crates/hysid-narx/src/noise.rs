@@ -42,6 +42,31 @@ impl Trainer {
         noise: &[(Term, usize)],
         windows: &[Window],
     ) -> Result<Narmax, NarxError> {
+        self.extended(None, terms, noise, windows)
+    }
+
+    /// The `noise` terms beside a process model that stays as it is: what its one-step residuals say of each other.
+    ///
+    /// # Errors
+    /// Fewer samples than noise terms; a residual's lag of 0.
+    pub fn noise_terms(
+        &mut self,
+        fit: &Fit,
+        noise: &[(Term, usize)],
+        windows: &[Window],
+    ) -> Result<Vec<NoiseTerm>, NarxError> {
+        self.enter(&fit.derived);
+        Ok(self.extended(Some(fit), &[], noise, windows)?.noise)
+    }
+
+    /// Extended least squares of what a `fixed` process model leaves, or of the output.
+    fn extended(
+        &self,
+        fixed: Option<&Fit>,
+        terms: &[Term],
+        noise: &[(Term, usize)],
+        windows: &[Window],
+    ) -> Result<Narmax, NarxError> {
         if noise.iter().any(|(_, lag)| *lag == 0) {
             return Err(NarxError::LeastSquares("a residual's lag must be 1 or more".into()));
         }
@@ -53,14 +78,16 @@ impl Trainer {
         }
         let all: Vec<Term> = terms.iter().cloned().chain(noise.iter().map(|(t, _)| t.clone())).collect();
         let program = Program::new(&all);
+        let base = Program::new(fixed.map_or(&[], |f| &f.terms));
+        let base_theta = fixed.map_or(&[][..], |f| &f.theta);
         let (mut phi, mut target) = (Matrix::zeros(rows, width), Vec::with_capacity(rows));
         // What multiplies each residual, and how many rows of the same window lie before each row.
         let mut factors = vec![vec![0.0; noise.len()]; rows];
         let mut before = Vec::with_capacity(rows);
         for window in windows {
             let bank = bank_of(self.banks(), window.record)?;
-            let inputs = program.inputs(bank)?;
-            let mut v = vec![0.0; program.factors.len()];
+            let (inputs, base_inputs) = (program.inputs(bank)?, base.inputs(bank)?);
+            let (mut v, mut w) = (vec![0.0; program.factors.len()], vec![0.0; base.factors.len()]);
             for (i, n) in (window.range.start + start..window.range.end).enumerate() {
                 program.factor_values(n, n, &bank.y, &bank.y_sign, &inputs, &mut v);
                 let row = target.len();
@@ -71,7 +98,8 @@ impl Trainer {
                     *f = program.term(terms.len() + k, &v);
                 }
                 before.push(i);
-                target.push(bank.y[n]);
+                base.factor_values(n, n, &bank.y, &bank.y_sign, &base_inputs, &mut w);
+                target.push(bank.y[n] - base.sum(base_theta, &w));
             }
         }
         let mut theta = vec![0.0; width];

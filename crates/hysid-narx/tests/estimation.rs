@@ -1,7 +1,7 @@
 //! Estimation against known truth: refinement, growth, extended least squares, resting points.
 
 use hysid_dictionary::{Record, Signals, Term};
-use hysid_narx::{Coefficient, Evaluate, NarxModel, Parts, Refine, Trainer, Window};
+use hysid_narx::{Coefficient, Evaluate, Fit, NarxModel, Parts, Refine, Trainer, Window};
 
 fn noise(n: usize, seed: u64) -> Vec<f64> {
     let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
@@ -81,6 +81,23 @@ fn the_next_term_is_the_one_that_is_missing() {
     // ERR sums to the explained share.
     let err = trainer.error_reduction(&longer.terms, &all(n)).unwrap();
     assert!((err.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{err:?}");
+}
+
+#[test]
+fn noise_terms_beside_a_fixed_process_find_the_colour_of_its_residual() {
+    // White noise on the output of a linear system: the one-step residual is e[n] - 0.8 e[n-1].
+    let n = 20_000;
+    let (u, e) = (noise(n, 15), noise(n, 16));
+    let mut clean = vec![0.0; n];
+    for k in 1..n {
+        clean[k] = 0.8 * clean[k - 1] + u[k];
+    }
+    let y: Vec<f64> = clean.iter().zip(&e).map(|(y, e)| y + 0.5 * e).collect();
+    let signals = Signals::siso();
+    let fit = Fit { terms: terms(&signals, &["y[n-1]", "u[n]"]), theta: vec![0.8, 1.0], derived: vec![] };
+    let mut trainer = Trainer::new(signals.clone(), vec![], &[Record::siso(&u, &y)], 1, 1e3).unwrap();
+    let found = trainer.noise_terms(&fit, &[(Term::constant(), 1), (Term::constant(), 2)], &all(n)).unwrap();
+    assert!((found[0].theta + 0.8).abs() < 0.03 && found[1].theta.abs() < 0.03, "{found:?}");
 }
 
 #[test]

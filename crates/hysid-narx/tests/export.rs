@@ -3,11 +3,11 @@
 use std::process::Command;
 
 use hysid_dictionary::{Record, SignalName, Signals};
-use hysid_narx::{Coefficient, Derived, Law, NarxModel, Parts};
+use hysid_narx::{Coefficient, Derived, Law, NarxModel, Parts, Past};
 
 fn model() -> NarxModel {
     let derived = vec![
-        Derived { symbol: "w1".into(), source: 0, law: Law::Play { half_width: 0.25, came_from: Some(-0.75) } },
+        Derived { symbol: "w1".into(), source: 0, law: Law::Play { half_width: 0.25, past: Past::TurnedAt(-0.75) } },
         Derived { symbol: "w2".into(), source: 1, law: Law::Filter { a: vec![-0.5, 0.1, -0.05, 0.01] } },
         Derived { symbol: "w3".into(), source: 0, law: Law::Dahl { length: 0.5 } },
         Derived { symbol: "w4".into(), source: 3, law: Law::SoftThreshold { centre: 0.1, width: 0.2 } },

@@ -1,7 +1,7 @@
 //! The model against hand computation, the dictionary's own evaluator, and its file.
 
 use hysid_dictionary::{Model, Record, Signal, SignalName, Signals};
-use hysid_narx::{Coefficient, Derived, Law, NarxModel, NoiseTerm, Parts};
+use hysid_narx::{Coefficient, Derived, Law, NarxModel, NoiseTerm, Parts, Past};
 use proptest::prelude::*;
 
 fn parts(terms: &[(&str, f64)], derived: Vec<Derived>) -> Parts {
@@ -99,7 +99,7 @@ fn a_noise_model_uses_past_residuals() {
 #[test]
 fn a_model_survives_its_file() {
     let derived = vec![
-        Derived { symbol: "w1".into(), source: 0, law: Law::Play { half_width: 0.25, came_from: Some(-0.75) } },
+        Derived { symbol: "w1".into(), source: 0, law: Law::Play { half_width: 0.25, past: Past::TurnedAt(-0.75) } },
         Derived { symbol: "w2".into(), source: 1, law: Law::Filter { a: vec![-0.5, 0.1] } },
         Derived { symbol: "w3".into(), source: 0, law: Law::Dahl { length: 0.5 } },
         Derived { symbol: "w4".into(), source: 2, law: Law::SoftThreshold { centre: 0.1, width: 0.2 } },

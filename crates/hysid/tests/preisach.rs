@@ -22,8 +22,9 @@ fn the_free_run_follows_other_inputs() {
     let plane = PreisachPlane::of_the_paper().staircase().unwrap();
     let fresh = multisine(2000, 77);
     let fresh_y = plane.run(&fresh);
-    // The input that teaches, and the relative error that the fresh one must stay below.
-    for (name, u, bound) in [("one loop", one_loop(), 0.08), ("a multisine", multisine(2500, 7), 0.06)] {
+    // The input that teaches, and the relative error that the fresh one must stay below. One loop does not tell what the
+    // operator remembered before it.
+    for (name, u, bound) in [("one loop", one_loop(), 0.3), ("a multisine", multisine(2500, 7), 0.06)] {
         let channel = |name: &str, x: Vec<f64>| Channel { name: name.into(), samples: x };
         let y = plane.run(&u);
         let clock = Clock { start_s: 0.0, period_s: 0.01 };

@@ -6,6 +6,7 @@
 
 mod page;
 mod sets;
+mod untouched;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -27,6 +28,9 @@ pub struct Args {
     /// Only sets whose name contains this; the page is then not written.
     #[arg(long)]
     only: Option<String>,
+    /// The check on data that nobody had looked at while the recipe was made.
+    #[arg(long)]
+    untouched: bool,
     /// A recording (CSV) with columns `u` and `y`: identified on its first half, run on its second.
     #[arg(long)]
     halves: Option<PathBuf>,
@@ -34,7 +38,7 @@ pub struct Args {
 
 /// One line of the table: one validation recording of one set.
 pub(crate) struct Line {
-    set: &'static str,
+    set: String,
     file: String,
     unit: &'static str,
     ours: f64,
@@ -54,6 +58,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.halves {
         return halves(file);
     }
+    let page = crate::root().join("docs/recordings.md");
+    if args.untouched {
+        let lines = untouched::lines(&args.dir)?;
+        return page::write(&page, page::UNTOUCHED, &page::table(&lines));
+    }
     if !args.dir.is_dir() {
         let required = std::env::var_os("HYSID_REQUIRE_RECORDINGS").is_some_and(|v| v == "1");
         anyhow::ensure!(!required, "{}: there are no recordings, and HYSID_REQUIRE_RECORDINGS=1", args.dir.display());
@@ -63,7 +72,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut lines = Vec::new();
     for set in SETS.iter().filter(|s| args.only.as_ref().is_none_or(|o| s.name.contains(o.as_str()))) {
         eprintln!("{}", set.name);
-        let new = one(&args.dir, set).with_context(|| set.name)?;
+        let new = one(&args.dir, set.name, set).with_context(|| set.name)?;
         for line in &new {
             println!("{}", page::row(line));
         }
@@ -71,7 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     println!("\n{}", page::table(&lines));
     if args.only.is_none() {
-        page::write(&crate::root().join("docs/recordings.md"), &lines)?;
+        page::write(&page, page::FIT, &page::with_models(&lines)?)?;
     }
     Ok(())
 }
@@ -83,8 +92,8 @@ fn read(path: &Path, set: &Set) -> anyhow::Result<Recording> {
     Ok(read_recording(path, &ReadOptions { time, columns })?)
 }
 
-fn one(dir: &Path, set: &'static Set) -> anyhow::Result<Vec<Line>> {
-    let folder = dir.join(set.name);
+fn one(dir: &Path, folder: &str, set: &'static Set) -> anyhow::Result<Vec<Line>> {
+    let folder = dir.join(folder);
     let meta: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(folder.join("meta.json"))?)?;
     let part = |r: Recording, share: (f64, f64)| {
         let n = r.len() as f64;
@@ -98,7 +107,7 @@ fn one(dir: &Path, set: &'static Set) -> anyhow::Result<Vec<Line>> {
     let (found, seconds) = timed(&estimation, set)?;
     let mut lines = Vec::new();
     for v in set.validation {
-        lines.push(line(&folder, set, v, &found, seconds, &meta)?);
+        lines.push(validated(&folder, set, v, &found, seconds, &meta)?);
     }
     Ok(lines)
 }
@@ -111,7 +120,7 @@ fn timed(estimation: &[Recording], set: &Set) -> anyhow::Result<(Identified, f64
     Ok((found, start.elapsed().as_secs_f64()))
 }
 
-fn line(
+fn validated(
     folder: &Path,
     set: &'static Set,
     v: &'static Validation,
@@ -130,22 +139,36 @@ fn line(
         serde_json::Value::String(s) => s.clone(),
         other => other.to_string(),
     });
+    let line = line(set.name, v.name, set.unit, set.scale, &scores, found, seconds);
+    Ok(Line { target: v.target, published, ..line })
+}
+
+/// A line without a target but to beat the linear model.
+fn line(
+    set: &str,
+    file: &str,
+    unit: &'static str,
+    scale: f64,
+    scores: &Scores,
+    found: &Identified,
+    seconds: f64,
+) -> Line {
     let (ours, linear, std) = scores.rms();
-    Ok(Line {
-        set: set.name,
-        file: v.name.to_string(),
-        unit: set.unit,
-        ours: ours * set.scale,
-        linear: linear * set.scale,
-        std: std * set.scale,
+    Line {
+        set: set.to_owned(),
+        file: file.to_owned(),
+        unit,
+        ours: ours * scale,
+        linear: linear * scale,
+        std: std * scale,
         terms: found.model.terms().len(),
         rate: found.model.parts().decimation,
         seconds,
         diverged: scores.diverged,
-        target: v.target,
-        published,
+        target: None,
+        published: "-".to_owned(),
         equation: found.model.equation(),
-    })
+    }
 }
 
 /// Sums of squares over the samples that both models predict.

@@ -7,8 +7,9 @@ use super::Line;
 
 const HEAD: &str = "| set | validation | ours | linear, same way | ratio | std of y | target | met | terms | every | time s | quoted in meta.json |\n\
                     |---|---|---:|---:|---:|---:|---:|:-:|---:|---:|---:|---|\n";
-/// The part of the page that this task writes stands between these marks.
-const MARKS: (&str, &str) = ("<!-- fit: begin -->", "<!-- fit: end -->");
+/// The parts of the page that this task writes stand between these marks.
+pub(crate) const FIT: (&str, &str) = ("<!-- fit: begin -->", "<!-- fit: end -->");
+pub(crate) const UNTOUCHED: (&str, &str) = ("<!-- untouched: begin -->", "<!-- untouched: end -->");
 
 /// One line of the table.
 pub(crate) fn row(l: &Line) -> String {
@@ -47,30 +48,32 @@ pub(crate) fn table(lines: &[Line]) -> String {
     out
 }
 
-/// Puts the table and the models into the page, between its marks.
-pub(crate) fn write(path: &Path, lines: &[Line]) -> anyhow::Result<()> {
-    let mut part = String::new();
-    writeln!(part, "{}\n", MARKS.0)?;
-    writeln!(
-        part,
-        "Root mean square errors of the free run over the validation recordings, made by `cargo xtask recordings`.\n"
-    )?;
+/// The table with the models below it.
+pub(crate) fn with_models(lines: &[Line]) -> anyhow::Result<String> {
+    let mut part = String::from(
+        "Root mean square errors of the free run over the validation recordings, made by `cargo xtask recordings`.\n\n",
+    );
     writeln!(part, "{}", table(lines))?;
     writeln!(part, "The models:\n")?;
     let mut last = "";
     for l in lines.iter() {
         if l.set != last {
             writeln!(part, "- {}: `{}`", l.set, l.equation)?;
-            last = l.set;
+            last = &l.set;
         }
     }
-    write!(part, "\n{}", MARKS.1)?;
+    Ok(part)
+}
+
+/// Puts the text into the page, between these marks.
+pub(crate) fn write(path: &Path, marks: (&str, &str), text: &str) -> anyhow::Result<()> {
     let before =
-        std::fs::read_to_string(path).unwrap_or_else(|_| format!("# Recordings\n\n{}\n{}\n", MARKS.0, MARKS.1));
-    let (Some(from), Some(to)) = (before.find(MARKS.0), before.find(MARKS.1)) else {
-        anyhow::bail!("{}: the marks {MARKS:?} are missing", path.display());
+        std::fs::read_to_string(path).unwrap_or_else(|_| format!("# Recordings\n\n{}\n{}\n", marks.0, marks.1));
+    let (Some(from), Some(to)) = (before.find(marks.0), before.find(marks.1)) else {
+        anyhow::bail!("{}: the marks {marks:?} are missing", path.display());
     };
-    hysid_io::write_text(path, &format!("{}{part}{}", &before[..from], &before[to + MARKS.1.len()..]))?;
+    let (head, tail) = (&before[..from + marks.0.len()], &before[to..]);
+    hysid_io::write_text(path, &format!("{head}\n\n{}\n\n{tail}", text.trim()))?;
     Ok(())
 }
 
@@ -80,7 +83,7 @@ mod tests {
 
     fn line(ours: f64, target: Option<f64>) -> Line {
         Line {
-            set: "s",
+            set: "s".into(),
             file: "f".into(),
             unit: "mV",
             ours,
@@ -114,8 +117,8 @@ mod tests {
     fn the_page_keeps_what_others_wrote() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recordings.md");
-        std::fs::write(&path, format!("# Head\n\n{}\nold\n{}\n\nTail\n", MARKS.0, MARKS.1)).unwrap();
-        write(&path, &[line(0.2, None)]).unwrap();
+        std::fs::write(&path, format!("# Head\n\n{}\nold\n{}\n\nTail\n", FIT.0, FIT.1)).unwrap();
+        write(&path, FIT, &with_models(&[line(0.2, None)]).unwrap()).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(
             text.starts_with("# Head")

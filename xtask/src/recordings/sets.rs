@@ -29,7 +29,7 @@ pub(crate) struct Validation {
     pub published: &'static str,
 }
 
-const ALL: (f64, f64) = (0.0, 1.0);
+pub(super) const ALL: (f64, f64) = (0.0, 1.0);
 
 const fn of(
     name: &'static str,

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use hysid_dictionary::{Factor, Quantity, Signal};
 
-use crate::{Law, NarxModel};
+use crate::{Law, NarxModel, Past};
 
 impl NarxModel {
     /// A C99 source: `hysid_known` feeds a recorded sample, `hysid_step` returns the next output. No allocation.
@@ -42,12 +42,13 @@ impl NarxModel {
         for (i, d) in self.parts().derived.iter().enumerate() {
             let (w, x) = (p.recorded + i, d.source);
             let line = match &d.law {
-                Law::Play { half_width, came_from } => format!(
+                Law::Play { half_width, past } => format!(
                     "x[{w}][0] = fmax(x[{x}][0] - {r}, fmin(x[{x}][0] + {r}, s->started ? x[{w}][1] : {start}));",
                     r = number(*half_width),
-                    start = match came_from {
-                        None => format!("x[{x}][0]"),
-                        Some(h) => format!(
+                    start = match past {
+                        Past::FirstSample => format!("x[{x}][0]"),
+                        Past::RestedAt(h) => number(*h),
+                        Past::TurnedAt(h) => format!(
                             "({h} <= x[{x}][0] ? {h} + {r} : {h} - {r})",
                             h = number(*h),
                             r = number(*half_width)
@@ -120,12 +121,13 @@ impl NarxModel {
         for (i, d) in self.parts().derived.iter().enumerate() {
             let (w, x) = (p.recorded + i, d.source);
             let lines = match &d.law {
-                Law::Play { half_width, came_from } => vec![format!(
+                Law::Play { half_width, past } => vec![format!(
                     "x[{w}][0] = max(x[{x}][0] - {r}, min(x[{x}][0] + {r}, x[{w}][1] if started else {start}))",
                     r = number(*half_width),
-                    start = match came_from {
-                        None => format!("x[{x}][0]"),
-                        Some(h) => format!(
+                    start = match past {
+                        Past::FirstSample => format!("x[{x}][0]"),
+                        Past::RestedAt(h) => number(*h),
+                        Past::TurnedAt(h) => format!(
                             "({h} + {r} if {h} <= x[{x}][0] else {h} - {r})",
                             h = number(*h),
                             r = number(*half_width)

@@ -7,7 +7,7 @@
 //! Pokrovskii, *Systems with Hysteresis* (1989); Brokate and Sprekels, *Hysteresis and Phase Transitions* (1996), section 2.4.
 
 use hysid_dictionary::{Factor, Signal, Term};
-use hysid_narx::{Derived, Law, Refine};
+use hysid_narx::{Derived, Law, Past, Refine};
 use rayon::prelude::*;
 
 use super::IdentifyError;
@@ -63,20 +63,23 @@ fn of_shares(desk: &Desk<'_>, ny: usize, nu: usize, shares: &[f64]) -> Result<Op
     Ok(done.into_iter().flatten().min_by(|a, b| a.1.taught.rmse.total_cmp(&b.1.taught.rmse)))
 }
 
-/// Where the inputs may have come from before the recordings began: for each input a level, or nothing.
-fn pasts(desk: &Desk<'_>) -> Vec<Vec<Option<f64>>> {
+/// What the plays of each input may have remembered when the recordings began.
+fn pasts(desk: &Desk<'_>) -> Vec<Vec<Past>> {
     let ranges: Vec<_> = (0..desk.inputs()).map(|i| desk.input(i)).collect();
-    let beyond = |share: f64, above: bool| {
-        let level =
-            |s: Spread| if above { s.high + share * (s.high - s.low) } else { s.low - share * (s.high - s.low) };
-        ranges.iter().map(|s| s.map(level)).collect()
-    };
-    let nothing = vec![None; desk.inputs()];
-    let levels = [false, true].into_iter().flat_map(|above| BEYOND.map(|share| beyond(share, above)));
-    std::iter::once(nothing).chain(levels).collect()
+    let of_all = |past: &dyn Fn(Spread) -> Past| ranges.iter().map(|s| s.map_or(Past::FirstSample, past)).collect();
+    let mut all: Vec<Vec<Past>> = vec![
+        of_all(&|_| Past::FirstSample),
+        of_all(&|_| Past::RestedAt(0.0)),
+        of_all(&|s| Past::RestedAt(0.5 * (s.low + s.high))),
+    ];
+    for share in BEYOND {
+        all.push(of_all(&|s| Past::TurnedAt(s.low - share * (s.high - s.low))));
+        all.push(of_all(&|s| Past::TurnedAt(s.high + share * (s.high - s.low))));
+    }
+    all
 }
 
-fn family(desk: &Desk<'_>, ny: usize, nu: usize, shares: &[f64], past: &[Option<f64>]) -> Family {
+fn family(desk: &Desk<'_>, ny: usize, nu: usize, shares: &[f64], past: &[Past]) -> Family {
     let inputs = desk.inputs();
     let first = desk.options.input_delay.unwrap_or(0);
     let power = desk.options.degree.unwrap_or(POWER);
@@ -87,7 +90,7 @@ fn family(desk: &Desk<'_>, ny: usize, nu: usize, shares: &[f64], past: &[Option<
         let half = desk.input(i).map_or(0.0, |s| 0.5 * (s.high - s.low));
         for share in shares.iter().step_by(inputs) {
             let signal = Signal::Input(inputs + derived.len());
-            let law = Law::Play { half_width: share * half, came_from: *past };
+            let law = Law::Play { half_width: share * half, past: *past };
             derived.push(Derived { symbol: format!("w{}", derived.len() + 1), source: i, law });
             start.push(Term::new([Factor::value(signal, first)]));
             memories.push(signal);
