@@ -102,9 +102,15 @@ fn every_verdict_has_its_headline() {
     let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
     for (verdict, expected) in cases {
         let html = page(&file(verdict), &picture(), &provenance);
-        for part in
-            [expected, "Servo &lt;axis&gt;", "hold-out, never used", "seed 7", "The recording has 2 gaps.", "0.12"]
-        {
+        for part in [
+            expected,
+            "Servo &lt;axis&gt;",
+            "hold-out, never used",
+            "seed 7",
+            "The recording has 2 gaps.",
+            "0.12",
+            "What to do next",
+        ] {
             assert!(html.contains(part), "{verdict:?}: the page does not say `{part}`");
         }
         assert_eq!(html.contains("19.8 to 20.9"), verdict != VerdictKind::NoSignificantMismatch);

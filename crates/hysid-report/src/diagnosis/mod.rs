@@ -1,8 +1,9 @@
 //! The report of a diagnosis: one page that an engineer shows to a colleague.
 //!
-//! Order of the page: the verdict in one sentence, the figures of merit, recording and simulations over time, the residual
-//! over frequency, where the mismatch lives, the law that was found, the candidates, the parameters, what the recording
-//! could not have shown, the proposed experiment, how to make the page again.
+//! Order of the page: the verdict in one sentence, the figures of merit, what is missing, what to do next (with the proposed
+//! experiment), the errors on the hold-out, recording and simulations over time, the residual over frequency, where the
+//! mismatch lives, the law that was found, the candidates, the parameters, what the recording could not have shown (further
+//! up where nothing was found), how to make the page again.
 
 mod figures;
 mod words;
@@ -14,26 +15,32 @@ use crate::page::{Align, Page, Table, Tenor};
 use crate::words::{Provenance, interval, number, p_value, percent, probability};
 
 /// How many of the smallest detectable effects are listed.
-const MOST_DETECTABLE: usize = 14;
+const MOST_DETECTABLE: usize = 60;
 /// How many rivals are listed.
 const MOST_RIVALS: usize = 12;
 
 /// The page as HTML text.
 pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) -> String {
-    let mut page = Page::new(format!("Diagnosis: {}", picture.title), words::headline(file), file.summary.clone());
+    let mut page =
+        Page::new(format!("Diagnosis: {}", picture.title), words::headline(file), words::told(&file.summary, file));
     merit(&mut page, file);
-    page.notes(Tenor::Warning, &file.notes);
     effects(&mut page, file);
+    next(&mut page, file);
+    fits(&mut page, file);
+    page.notes(Tenor::Warning, &file.notes);
+    if file.verdict == VerdictKind::NoSignificantMismatch {
+        limits(&mut page, file);
+    }
     time(&mut page, picture);
     residual(&mut page, picture);
     location(&mut page, file, picture);
     laws(&mut page, picture);
     candidates(&mut page, file);
     correction(&mut page, file);
-    fits(&mut page, file);
     parameters(&mut page, &picture.parameters);
-    limits(&mut page, file);
-    experiment(&mut page, file);
+    if file.verdict != VerdictKind::NoSignificantMismatch {
+        limits(&mut page, file);
+    }
     page.section(
         "How to make this page again",
         "The same recordings and the same seed give the same verdict, whatever the number of threads.",
@@ -56,6 +63,20 @@ fn merit(page: &mut Page, file: &DiagnosisFile) {
         ));
         if let Some(c) = first.concealment {
             facts.push((percent(c), "of its response could be absorbed by wrong parameters".into()));
+        }
+    }
+    if let [one] = file.fit.as_slice()
+        && let Some(before) = one.rmse_before
+    {
+        let found = one.rmse_after.filter(|_| file.verdict != VerdictKind::NoSignificantMismatch);
+        facts.push(match found {
+            Some(after) => {
+                (format!("{} \u{2192} {}", number(before), number(after)), "hold-out error, before and after".into())
+            }
+            None => (number(before), "hold-out error of the recalibrated simulation".into()),
+        });
+        if let Some(black) = one.rmse_black_box {
+            facts.push((number(black), "hold-out error of a black box without any physics".into()));
         }
     }
     let best = file.fit.iter().filter_map(|f| f.ratio).fold(None, |m: Option<f64>, r| Some(m.map_or(r, |m| m.max(r))));
@@ -100,7 +121,11 @@ fn time(page: &mut Page, picture: &Picture) {
     }
     page.section(
         "Recording and simulation over time",
-        "Both simulations run free: they see the input only. Before: the simulation with its parameters calibrated again. After: with the effect in it.",
+        if picture.records.iter().any(|r| r.after.is_some()) {
+            "Both simulations run free: they see the input only. Before: the simulation with its parameters calibrated again. After: with the effect in it."
+        } else {
+            "The simulation runs free: it sees the input only. Its parameters are calibrated again."
+        },
     );
     for record in &picture.records {
         let role = figures::role(record.role);
@@ -129,12 +154,20 @@ fn location(page: &mut Page, file: &DiagnosisFile, picture: &Picture) {
     let Some(location) = &file.location else { return };
     page.section("Where they part", "");
     let list = |pairs: &[[f64; 2]], unit: &str| {
-        let parts: Vec<String> =
-            pairs.iter().map(|[a, b]| format!("{} to {} {unit}", number(*a), number(*b))).collect();
+        let parts: Vec<String> = pairs
+            .iter()
+            .map(|[a, b]| {
+                if a == b {
+                    format!("near {} {unit}", number(*a))
+                } else {
+                    format!("{} to {} {unit}", number(*a), number(*b))
+                }
+            })
+            .collect();
         if parts.is_empty() { "throughout".to_string() } else { parts.join(", ") }
     };
     let mut table = Table::new(&[("", Align::Left), ("", Align::Left)]);
-    table.row(["place in the simulation".into(), location.slot.clone()]);
+    table.row(["place in the simulation".into(), words::place(&location.slot)]);
     table.row(["block".into(), words::plain(&location.block)]);
     table.row(["time".into(), list(&location.time_s, "s")]);
     table.row(["frequency".into(), list(&location.band_hz, "Hz")]);
@@ -183,7 +216,7 @@ fn candidates(page: &mut Page, file: &DiagnosisFile) {
         table.row([
             words::plain(&e.mechanism),
             words::plain(&e.family),
-            e.slot.clone(),
+            words::place(&e.slot),
             p,
             "0".into(),
             String::new(),
@@ -194,7 +227,7 @@ fn candidates(page: &mut Page, file: &DiagnosisFile) {
         table.row([
             words::plain(&a.mechanism),
             words::plain(&a.family),
-            a.slot.clone(),
+            words::place(&a.slot),
             probability(a.probability),
             number(a.evidence_gap),
             a.separation.map(number).unwrap_or_default(),
@@ -226,7 +259,7 @@ fn fits(page: &mut Page, file: &DiagnosisFile) {
     }
     page.section(
         "Free-run error on recordings that were never used",
-        "Before is the calibrated simulation, never the first guess.",
+        "Before is the recalibrated simulation, never the first guess; after, with the effects in it. The black box is a NARX model without physics, identified from the same recordings and run on the same samples: where it is clearly better than the simulation after, something is still missing.",
     );
     let mut table = Table::new(&[
         ("recording", Align::Left),
@@ -256,23 +289,27 @@ fn parameters(page: &mut Page, parameters: &[ParameterPicture]) {
     if parameters.is_empty() {
         return;
     }
-    page.section("Parameters", "A parameter that moves far when the effect is put in had been absorbing it.");
-    let mut table = Table::new(&[
-        ("parameter", Align::Left),
-        ("given", Align::Right),
-        ("before", Align::Right),
-        ("95 % interval", Align::Right),
-        ("after", Align::Right),
-        ("95 % interval", Align::Right),
-        ("unit", Align::Left),
-        ("remark", Align::Left),
-    ]);
+    let found = parameters.iter().any(|p| p.after.is_some());
     let value = |v: Option<[f64; 3]>| v.map(|v| number(v[0])).unwrap_or_default();
     let range = |v: Option<[f64; 3]>| v.map(|v| interval(Some(v[1]), Some(v[2]))).unwrap_or_default();
+    let range_heading = ("95 % interval", Align::Right);
+    let mut columns = vec![("parameter", Align::Left), ("given", Align::Right)];
+    if found {
+        page.section("Parameters", "A parameter that moves far when the effect is put in had been absorbing it.");
+        columns.extend([("before", Align::Right), range_heading, ("after", Align::Right), range_heading]);
+    } else {
+        page.section("Parameters", "As the file gives them, and as the recordings do.");
+        columns.extend([("recalibrated", Align::Right), range_heading]);
+    }
+    columns.extend([("unit", Align::Left), ("remark", Align::Left)]);
+    let mut table = Table::new(&columns);
     for p in parameters {
-        let given = p.given.map(number).unwrap_or_default();
-        let cells = [p.name.clone(), given, value(p.before), range(p.before), value(p.after), range(p.after)];
-        table.row(cells.into_iter().chain([p.unit.clone(), p.remark.clone()]));
+        let mut cells = vec![p.name.clone(), p.given.map(number).unwrap_or_default(), value(p.before), range(p.before)];
+        if found {
+            cells.extend([value(p.after), range(p.after)]);
+        }
+        cells.extend([p.unit.clone(), p.remark.clone()]);
+        table.row(cells);
     }
     page.table(&table);
 }
@@ -291,8 +328,16 @@ fn limits(page: &mut Page, file: &DiagnosisFile) {
         ("smallest", Align::Right),
         ("unit", Align::Left),
     ]);
-    for d in file.mismatch.detectable.iter().take(MOST_DETECTABLE) {
-        table.row([words::plain(&d.mechanism), d.slot.clone(), number(d.smallest), d.unit.clone()]);
+    // What stands inside the plant is looked for first.
+    let mut sorted: Vec<_> = file.mismatch.detectable.iter().collect();
+    sorted.sort_by_key(|d| match d.slot.split(':').next() {
+        Some("state") => 0,
+        Some("input") => 1,
+        Some("output") => 2,
+        _ => 3,
+    });
+    for d in sorted.into_iter().take(MOST_DETECTABLE) {
+        table.row([words::plain(&d.mechanism), words::place(&d.slot), number(d.smallest), d.unit.clone()]);
     }
     page.table(&table);
     let more = file.mismatch.detectable.len().saturating_sub(MOST_DETECTABLE);
@@ -301,11 +346,14 @@ fn limits(page: &mut Page, file: &DiagnosisFile) {
     }
 }
 
-fn experiment(page: &mut Page, file: &DiagnosisFile) {
+fn next(page: &mut Page, file: &DiagnosisFile) {
+    page.section("What to do next", "");
+    page.text(words::next_step(file));
     let Some(experiment) = &file.experiment else { return };
-    page.section("The experiment that would decide", "");
     page.text(&experiment.sentence);
-    if let (Some(expected), Some(present)) = (experiment.expected_separation, experiment.present_separation) {
+    if let (Some(expected), Some(present)) = (experiment.expected_separation, experiment.present_separation)
+        && experiment.separable
+    {
         let text = format!(
             "Separation expected: {} (25 settles it); on this recording: {}.",
             number(expected),

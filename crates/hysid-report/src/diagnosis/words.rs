@@ -19,3 +19,46 @@ pub(super) fn headline(file: &DiagnosisFile) -> String {
         VerdictKind::NotInCatalogue => "Something is missing that the catalogue does not hold".into(),
     }
 }
+
+/// A slot of the file format as words.
+pub(super) fn place(slot: &str) -> String {
+    match slot.split_once(':') {
+        Some(("input", name)) => format!("the input {name}"),
+        Some(("state", name)) => format!("the equation of {name}"),
+        Some(("output", name)) => format!("the output {name}"),
+        Some(("parameter", name)) => format!("the parameter {name}"),
+        _ => plain(slot),
+    }
+}
+
+/// A sentence of the file with the identifiers that the file names in words.
+pub(super) fn told(text: &str, file: &DiagnosisFile) -> String {
+    let effects = file.effects.iter().map(|e| (&e.mechanism, &e.family, &e.slot));
+    let rivals = file.alternatives.iter().map(|a| (&a.mechanism, &a.family, &a.slot));
+    effects.chain(rivals).fold(text.to_owned(), |text, (mechanism, family, slot)| {
+        text.replace(mechanism.as_str(), &plain(mechanism))
+            .replace(family.as_str(), &plain(family))
+            .replace(&format!("at {slot} ("), &format!("at {} (", place(slot)))
+    })
+}
+
+/// What an engineer does with this verdict.
+pub(super) fn next_step(file: &DiagnosisFile) -> &'static str {
+    match file.verdict {
+        VerdictKind::NoSignificantMismatch => {
+            "Nothing needs to be added: keep the simulation with the recalibrated parameters below. An effect can still be hidden where it is smaller than the recording would have shown; see the table."
+        }
+        VerdictKind::Named => {
+            "Use augmented.sim.toml: it is the simulation with the effect in it, calibrated. Check that its parameters are plausible for your machine."
+        }
+        VerdictKind::Family => {
+            "The kind of effect is certain, its exact law is not. augmented.sim.toml holds the likeliest law; on recordings like these its siblings would do as well."
+        }
+        VerdictKind::Ambiguous => {
+            "Do not build any of these into the simulation yet. Record again in the way proposed here, where there is a proposal, and diagnose both recordings together."
+        }
+        VerdictKind::NotInCatalogue => {
+            "Look for physics at the place named below. The correction predicts better than the simulation alone, but do not use it outside the range of the recordings."
+        }
+    }
+}

@@ -86,7 +86,8 @@ impl Map {
 }
 
 fn compact(value: f64) -> String {
-    if value == 0.0 {
+    // Edges that a sum should have brought to zero.
+    if value.abs() < 1e-12 {
         "0".into()
     } else if (1e-3..1e5).contains(&value.abs()) {
         let decimals = (2.0 - value.abs().log10().floor()).clamp(0.0, 6.0) as usize;
