@@ -115,6 +115,14 @@ fn equation(page: &mut Page, report: &FitReport) {
         table.row([t.term.clone(), number(t.coefficient), error, err]);
     }
     page.table(&table);
+    if !s.noise.is_empty() {
+        let terms: Vec<String> =
+            s.noise.iter().map(|t| format!("{} e[n-{}]", number(t.coefficient), t.residual_lag)).collect();
+        page.text(&format!(
+            "One step ahead, past one-step residuals e help: + {}. They take no part in the free run.",
+            terms.join(" + ")
+        ));
+    }
     page.text("As LaTeX:");
     page.code(&report.latex);
 }

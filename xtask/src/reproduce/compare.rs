@@ -84,7 +84,7 @@ pub fn section() -> anyhow::Result<Section> {
         }],
         notes: vec![
             "Symbols of `hysid fit`: du[n] = u[n] - u[n-1], sgn its sign, w1, w2, ... outputs of play operators of the input, which the fit made itself.".into(),
-            "One loop of 202 samples does not hold what a model needs to follow other inputs, whatever the method. The stated variance 0.01 is a standard deviation of 0.1, \
+            "One loop of 202 samples says little of other inputs: what the operator remembered before it is a guess. The stated variance 0.01 is a standard deviation of 0.1, \
              larger than the Preisach output's own."
                 .into(),
         ],

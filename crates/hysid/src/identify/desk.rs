@@ -144,16 +144,7 @@ impl<'a> Desk<'a> {
     pub(crate) fn held_parts(&self, fit: &Fit, given: usize) -> Result<Vec<f64>, IdentifyError> {
         let mut trainer = self.trainer(&fit.derived, given)?;
         let hold = self.split(&trainer, usize::MAX / 8)?.hold;
-        let parts = PARTS.div_ceil(hold.len().max(1));
-        let mut out = Vec::new();
-        for residual in trainer.residuals(fit, &hold)? {
-            for part in residual.chunks(residual.len().div_ceil(parts).max(1)) {
-                let there = part.iter().filter(|e| e.is_finite());
-                let n = there.clone().count();
-                out.push(there.map(|e| e * e).sum::<f64>() / n.max(1) as f64);
-            }
-        }
-        Ok(out)
+        Ok(mean_squares(trainer.residuals(fit, &hold)?))
     }
 
     /// The held-out error, raised by the share of failed trials: what models are compared by.
@@ -163,6 +154,20 @@ impl<'a> Desk<'a> {
         }
         Ok(stage.held.rmse * (1.0 + PENALTY * self.failed_trials(&stage.fit, given)?))
     }
+}
+
+/// The mean squares of residuals, one list for each held-out block, on parts of equal length.
+pub(crate) fn mean_squares(residuals: Vec<Vec<f64>>) -> Vec<f64> {
+    let parts = PARTS.div_ceil(residuals.len().max(1));
+    let mut out = Vec::new();
+    for residual in &residuals {
+        for part in residual.chunks(residual.len().div_ceil(parts).max(1)) {
+            let there = part.iter().filter(|e| e.is_finite());
+            let n = there.clone().count();
+            out.push(there.map(|e| e * e).sum::<f64>() / n.max(1) as f64);
+        }
+    }
+    out
 }
 
 /// Whether errors `a` exceed errors `b`, on the same parts, by no more than the standard error of their mean difference.

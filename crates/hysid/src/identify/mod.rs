@@ -11,6 +11,7 @@
 //! 4. It is refined on all estimation samples, and checked: does it still run, does it stay, how far does it hold.
 
 mod blocks;
+mod coloured;
 mod criterion;
 mod data;
 mod desk;
@@ -30,7 +31,7 @@ mod verify;
 pub use options::{Criterion, Decimate, Factors, LARGEST_DEGREE, LARGEST_LAG, LARGEST_TERMS, Options};
 pub use path::PathPoint;
 pub use recipe::{Identified, Progress, Source, identify};
-pub use report::{Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, Role, Series, TermLine};
+pub use report::{Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, NoiseLine, Role, Series, TermLine};
 
 use hysid_narx::NarxError;
 

@@ -5,6 +5,7 @@ use hysid_signal::Recording;
 use rayon::prelude::*;
 
 use super::blocks::best_block;
+use super::coloured::with_noise;
 use super::criterion::by_criterion;
 use super::data::{Samples, gather};
 use super::desk::{Desk, within_chance};
@@ -335,6 +336,8 @@ fn finish(winner: Winner<'_>, mut decisions: Vec<String>, progress: Progress<'_>
     decisions.extend(winner.decisions);
     progress("refining on all samples");
     let (model, fit, note) = whole(&desk, &family, &stage, movable(&family))?;
+    decisions.push(note);
+    let (model, note) = with_noise(&desk, model, &fit)?;
     decisions.push(note);
     let (yardstick, _, _) = whole(&desk, &linear.family, &linear.stage, Refine::Coefficients)?;
     let horizon = horizon(&desk, &family, &stage)?;

@@ -31,6 +31,17 @@ pub struct TermLine {
     pub err: Option<f64>,
 }
 
+/// One term of the noise model, which takes part in one-step predictions only.
+#[derive(Debug, Clone, Serialize)]
+pub struct NoiseLine {
+    /// What multiplies the residual, as text; `1` in a linear noise model.
+    pub term: String,
+    /// How many steps ago the residual was.
+    pub residual_lag: usize,
+    /// Coefficient.
+    pub coefficient: f64,
+}
+
 /// An error over one recording.
 #[derive(Debug, Clone, Serialize)]
 pub struct ErrorLine {
@@ -83,6 +94,8 @@ pub struct FitSummary {
     pub derived: Vec<String>,
     /// The terms.
     pub terms: Vec<TermLine>,
+    /// The noise model; empty where none pays.
+    pub noise: Vec<NoiseLine>,
     /// The model moves in steps of so many samples.
     pub decimation: usize,
     /// Lags.
@@ -201,6 +214,11 @@ impl FitReport {
                     standard_error: known(c.standard_error),
                     err: known(c.err),
                 })
+                .collect(),
+            noise: parts
+                .noise
+                .iter()
+                .map(|t| NoiseLine { term: parts.signals.format(&t.term), residual_lag: t.lag, coefficient: t.theta })
                 .collect(),
             decimation: parts.decimation,
             lags: lags(model),
