@@ -13,11 +13,21 @@ pub const MAX_AR: usize = 16;
 /// How the noise of a fit is modelled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoiseKind {
-    /// An autoregression: what is left is noise, whatever its colour.
+    /// An autoregression and a spectral shape: what is left is noise, whatever its colour.
     Coloured,
-    /// White, each sample counting for this share of one: what is left is mostly mismatch, whose colour says nothing of the noise. An
-    /// autoregression would explain a slow mismatch by its own past.
+    /// White, each row counting for this share of one: what is left is mismatch, whose colour says nothing of the noise. A coloured model
+    /// would explain a slow mismatch by its own past, and judge by frequencies at which nothing happens.
     White(f64),
+}
+
+impl NoiseKind {
+    /// How many independent rows each row stands for.
+    pub fn share(self) -> f64 {
+        match self {
+            Self::Coloured => 1.0,
+            Self::White(share) => share,
+        }
+    }
 }
 
 /// A simulation fitted to a data set under a noise model of its own.
@@ -59,21 +69,26 @@ pub fn fit_simulation<'d>(
         fit = Some(f);
     }
     let fit = fit?;
-    let mut log_likelihood = log_likelihood(data, &noise, &fit.residual);
-    if let NoiseKind::White(share) = kind {
-        log_likelihood *= share;
-    }
+    let log_likelihood = kind.share() * log_likelihood(data, &noise, &fit.residual);
     Some(Base { model, fit, whitener: noise, log_likelihood })
 }
 
 /// Log likelihood of a residual under a noise model, up to a constant of the data set.
 pub fn log_likelihood(data: &DataSet, noise: &Whitener, residual: &[f64]) -> f64 {
     let white = noise.apply(&data.layout, residual);
-    let coefficients: usize = noise.models.iter().map(|m| m.order()).sum();
+    let coefficients: usize = noise.models.iter().map(|m| m.coefficients()).sum();
     -0.5 * norm2(&white) - noise.log_scale(&data.layout) - 0.5 * coefficients as f64 * (data.rows().max(2) as f64).ln()
 }
 
+/// A noise whose innovations are a smaller share of it than this is no noise: something moves the output slowly and smoothly.
+const GROSS: f64 = 0.1;
+
 impl Base<'_> {
+    /// Whether the residual is mismatch throughout: its own past predicts it too well for noise.
+    pub fn gross(&self) -> bool {
+        self.whitener.models.iter().any(|m| m.innovation() < GROSS * m.noise_rms())
+    }
+
     /// The document with the fitted values.
     pub fn document(&self) -> Simulation {
         self.model.document(&self.fit.theta)

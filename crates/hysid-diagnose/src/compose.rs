@@ -63,7 +63,7 @@ pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Ve
     let white = h.base.whitener.apply(&data.layout, &fit.residual);
     let (mut score, mut squares) = (0.0, Vec::new());
     for s in &data.layout.series {
-        let scale = h.base.whitener.models[s.output].innovation().ln();
+        let scale = h.base.whitener.models[s.output].log_scale(s.rows.len()) / s.rows.len() as f64;
         for row in s.rows.clone().filter(|&row| weights[row] == 0.0) {
             score -= 0.5 * white[row] * white[row] + scale;
             squares.push(fit.residual[row] * fit.residual[row]);
@@ -108,7 +108,7 @@ impl<'d> Setting<'d> {
     /// The evidence of a fitted document.
     pub fn evidence(&self, base: &Base<'_>) -> f64 {
         let brought = base.model.unknowns().len().saturating_sub(self.own_unknowns) as f64;
-        base.log_likelihood - 0.5 * brought * (self.data.rows().max(2) as f64).ln()
+        base.log_likelihood - 0.5 * brought * (self.noise.share() * self.data.rows() as f64).max(2.0).ln()
     }
 }
 

@@ -166,7 +166,9 @@ fn maps(s: &Sitting<'_, '_>, found: bool) -> Vec<MapPicture> {
         let mut points = Vec::new();
         for part in layout.series.iter().filter(|p| p.output == o) {
             for (n, row) in part.rows.clone().enumerate() {
-                let at = |axis: usize| series[axis][part.stretch].get(part.first + n).copied().unwrap_or(f64::NAN);
+                let at = |axis: usize| {
+                    series[axis][part.stretch].get(part.first + n * s.data.step).copied().unwrap_or(f64::NAN)
+                };
                 points.push((at(0), at(1), row));
             }
         }
@@ -207,13 +209,13 @@ fn spectra(s: &Sitting<'_, '_>, found: bool) -> Vec<SpectrumPicture> {
         let Some(series) = mine.max_by_key(|p| p.rows.len()) else { continue };
         let segment = (series.rows.len() / 4).clamp(16, SEGMENT).min(series.rows.len());
         let spectrum = |e: &[f64]| {
-            let (f, power) = power_spectrum(&e[series.rows.clone()], s.data.period_s, segment).ok()?;
+            let (f, power) = power_spectrum(&e[series.rows.clone()], s.data.row_period_s(), segment).ok()?;
             Some((f, power.into_iter().map(f64::sqrt).collect::<Vec<f64>>()))
         };
         let Some((frequency_hz, before)) = spectrum(&s.none.base.fit.residual) else { continue };
         let Some((_, measured)) = spectrum(&s.data.y) else { continue };
         // White noise of the estimated strength has a flat density.
-        let nyquist = 0.5 / s.data.period_s;
+        let nyquist = 0.5 / s.data.row_period_s();
         let level = s.noise.get(o).copied().unwrap_or(0.0) / nyquist.sqrt();
         out.push(SpectrumPicture {
             output: output.column.clone(),

@@ -96,6 +96,11 @@ pub enum DiagnoseError {
         /// When, in seconds on the recording's clock.
         at_s: f64,
     },
+    /// A question about an effect that the simulation cannot have.
+    #[error(
+        "--consider {0}: no such mechanism at such a slot of this simulation; write MECHANISM@SLOT such as coulomb_friction@state:v, with the names that `hysid diagnose` reports"
+    )]
+    Question(String),
     /// An option outside its range.
     #[error("{option} is {given}; allowed is {allowed}")]
     Option {

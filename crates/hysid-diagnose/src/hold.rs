@@ -49,7 +49,7 @@ pub fn free_run(document: &Simulation, data: &DataSet, own_states: &[String], su
         if has_free(s.stretch) {
             let skip = (HEAD * data.stretches[s.stretch].len() as f64).ceil() as usize;
             for (n, row) in s.rows.clone().enumerate() {
-                if s.first + n < skip {
+                if s.first + n * data.step < skip {
                     scored[row] = false;
                 }
             }

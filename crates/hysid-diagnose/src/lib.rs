@@ -24,10 +24,14 @@ mod numerics_check;
 mod openset;
 mod pipeline;
 mod random;
+mod records;
 mod region;
 mod report_values;
 mod screen;
+mod search;
 mod text;
+mod thinning;
+mod weigh;
 
 pub use bootstrap::{Ratio, ratio_of_rms, rms};
 pub use column::{StandIn, stand_in};
@@ -35,4 +39,4 @@ pub use data::{DataSet, Stretch, held_out_blocks};
 pub use error::DiagnoseError;
 pub use model::{Model, Outputs, Unknown, Values};
 
-pub use pipeline::{Diagnosis, Hooks, Options, Request, diagnose};
+pub use pipeline::{Diagnosis, Hooks, Options, Question, Request, diagnose};

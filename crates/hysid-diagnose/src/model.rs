@@ -297,11 +297,10 @@ impl<'d> Model<'d> {
                 return None;
             }
             for series in self.data.layout.series.iter().filter(|x| x.stretch == s) {
-                let samples = series.first..series.first + series.rows.len();
-                prediction[series.rows.clone()]
-                    .copy_from_slice(&sensitivity.response.outputs[series.output][samples.clone()]);
+                let rows = |samples: &[f64]| self.data.rows_of(series, samples);
+                prediction[series.rows.clone()].copy_from_slice(&rows(&sensitivity.response.outputs[series.output]));
                 for (tangent, &c) in sensitivity.tangents.iter().zip(wanted) {
-                    columns[c][series.rows.clone()].copy_from_slice(&tangent[series.output][samples.clone()]);
+                    columns[c][series.rows.clone()].copy_from_slice(&rows(&tangent[series.output]));
                 }
             }
         }

@@ -253,7 +253,7 @@ fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
     let x = &white[series.rows.clone()];
     let lines = hysid_signal::fourier(x);
     let power: Vec<f64> = lines.iter().map(|(re, im)| re * re + im * im).collect();
-    let width = 1.0 / (data.period_s * x.len() as f64);
+    let width = 1.0 / (data.row_period_s() * x.len() as f64);
     let mut peaks: Vec<usize> =
         (2..power.len().saturating_sub(1)).filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1]).collect();
     peaks.sort_by(|a, b| power[*b].total_cmp(&power[*a]));

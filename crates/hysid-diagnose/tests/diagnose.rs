@@ -66,8 +66,14 @@ fn recording(name: &str, seed: u64, n: usize, force: impl Fn(f64, f64) -> f64) -
 fn run(text: &str, estimation: &[Recording], holdout: &[Recording]) -> Result<Diagnosis, DiagnoseError> {
     let simulation = Simulation::parse(text, "test.sim.toml").unwrap();
     let hooks = Hooks { progress: &|_| {}, expired: &|| false };
-    let request =
-        Request { simulation: &simulation, file: "test.sim.toml", estimation, holdout, options: Options::default() };
+    let request = Request {
+        simulation: &simulation,
+        file: "test.sim.toml",
+        estimation,
+        holdout,
+        questions: &[],
+        options: Options::default(),
+    };
     diagnose(&request, &hooks)
 }
 

@@ -119,6 +119,7 @@ impl DataSet {
             stretches,
             outputs.len(),
             notes,
+            1,
         ))
     }
 }

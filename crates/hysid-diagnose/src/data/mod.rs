@@ -12,6 +12,7 @@ use std::sync::Arc;
 use hysid_plant::Drive;
 
 use crate::evidence::{Layout, Series};
+use crate::thinning::{step, thin};
 
 pub use windows::held_out_blocks;
 
@@ -58,6 +59,8 @@ pub struct DataSet {
     pub recordings: Vec<String>,
     /// The stretches.
     pub stretches: Vec<Stretch>,
+    /// Samples from one row to the next: 1, or more where the outputs were thinned.
+    pub step: usize,
     /// The rows.
     pub layout: Layout,
     /// The stacked measured outputs.
@@ -73,22 +76,25 @@ impl DataSet {
         stretches: Vec<Stretch>,
         outputs: usize,
         notes: Vec<String>,
+        step: usize,
     ) -> Self {
         let mut layout = Layout { series: Vec::new(), outputs };
         let mut y = Vec::new();
         for (stretch, s) in stretches.iter().enumerate() {
             for (output, column) in s.outputs.iter().enumerate() {
                 for range in runs(column.iter().map(|v| v.is_finite())) {
-                    if range.len() < SHORTEST_SERIES {
+                    let count = range.len().div_ceil(step);
+                    if count < SHORTEST_SERIES {
                         continue;
                     }
-                    let rows = y.len()..y.len() + range.len();
-                    y.extend_from_slice(&column[range.clone()]);
+                    let rows = y.len()..y.len() + count;
+                    let last = range.start + (count - 1) * step;
+                    y.extend(thin(&column[range.start..=last], step));
                     layout.series.push(Series { stretch, output, first: range.start, rows });
                 }
             }
         }
-        Self { period_s, recordings, stretches, layout, y, notes }
+        Self { period_s, recordings, stretches, step, layout, y, notes }
     }
 
     /// One stretch with these inputs and outputs (`outputs[output][sample]`).
@@ -97,7 +103,7 @@ impl DataSet {
         let recorded = Arc::new(outputs.clone());
         let stretch =
             Stretch { recording: 0, samples: 0..drive.len(), start_s: drive.start_s(), drive, outputs, recorded };
-        Self::from_stretches(period_s, vec![String::new()], vec![stretch], count, Vec::new())
+        Self::from_stretches(period_s, vec![String::new()], vec![stretch], count, Vec::new(), 1)
     }
 
     /// Number of samples to simulate.
@@ -114,17 +120,28 @@ impl DataSet {
     pub fn stack(&self, outputs: &[Vec<Vec<f64>>]) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.rows());
         for s in &self.layout.series {
-            out.extend_from_slice(&outputs[s.stretch][s.output][s.first..s.first + s.rows.len()]);
+            out.extend(self.rows_of(s, &outputs[s.stretch][s.output]));
         }
         out
+    }
+
+    /// The rows of a series from the samples of its stretch.
+    pub fn rows_of(&self, series: &Series, samples: &[f64]) -> Vec<f64> {
+        let last = series.first + series.rows.len().saturating_sub(1) * self.step;
+        thin(&samples[series.first..=last], self.step)
+    }
+
+    /// Time from one row to the next, in seconds.
+    pub fn row_period_s(&self) -> f64 {
+        self.period_s * self.step as f64
     }
 
     /// Time of a row, in seconds, with the recording that it is from.
     pub fn time_of_rows(&self, series: &Series) -> impl Iterator<Item = f64> + '_ {
         let start = self.stretches[series.stretch].start_s;
-        let first = series.first;
+        let (first, step) = (series.first, self.step);
         let period_s = self.stretches[series.stretch].drive.period_s();
-        (0..series.rows.len()).map(move |n| start + (first + n) as f64 * period_s)
+        (0..series.rows.len()).map(move |n| start + (first + n * step) as f64 * period_s)
     }
 
     /// The same data with only those rows for which `wanted(stretch, sample, samples of the stretch)` holds; the inputs stay.
@@ -136,7 +153,23 @@ impl DataSet {
                 column.iter_mut().enumerate().filter(|(n, _)| !wanted(i, *n, len)).for_each(|(_, y)| *y = f64::NAN);
             }
         }
-        Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, self.notes.clone())
+        let notes = self.notes.clone();
+        Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, notes, self.step)
+    }
+
+    /// The same data with as few rows as its signals need.
+    pub fn thinned(&self) -> Self {
+        let outputs = self.stretches.iter().flat_map(|s| s.outputs.iter().map(Vec::as_slice));
+        let step = step(outputs, self.period_s, self.samples());
+        if step == 1 {
+            return self.clone();
+        }
+        let mut notes = self.notes.clone();
+        notes.push(format!(
+            "the outputs were filtered and every {step}-th sample of them is compared: nothing in them moves faster"
+        ));
+        let stretches = self.stretches.clone();
+        Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, notes, step)
     }
 
     /// The first samples of each stretch (this share of them), those included that are held out elsewhere.
@@ -149,7 +182,8 @@ impl DataSet {
     /// The same inputs with other measured outputs (in the order of the rows).
     pub fn with_outputs(&self, y: Vec<f64>) -> Self {
         let mut out = self.clone();
-        for s in &self.layout.series {
+        // Rows of thinned outputs are no samples; the rows alone are compared.
+        for s in self.layout.series.iter().filter(|_| self.step == 1) {
             out.stretches[s.stretch].outputs[s.output][s.first..s.first + s.rows.len()]
                 .copy_from_slice(&y[s.rows.clone()]);
         }

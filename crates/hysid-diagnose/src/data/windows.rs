@@ -65,7 +65,7 @@ impl DataSet {
         let mut notes = self.notes.clone();
         let used: usize = chosen.iter().map(Stretch::len).sum();
         notes.push(format!("of {total} samples the search used {used}, in {} windows", chosen.len()));
-        Self::from_stretches(self.period_s, self.recordings.clone(), chosen, self.layout.outputs, notes)
+        Self::from_stretches(self.period_s, self.recordings.clone(), chosen, self.layout.outputs, notes, self.step)
     }
 }
 

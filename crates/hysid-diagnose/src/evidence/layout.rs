@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::ar::{ArModel, fit_ar};
+use super::noise::NoiseModel;
 
 /// A run of rows that follow each other in time: one output of one stretch, between gaps.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,13 +37,13 @@ impl Layout {
         self.len() == 0
     }
 
-    /// One autoregressive model for each output, fitted to this stacked residual.
+    /// One noise model for each output, fitted to this stacked residual.
     pub fn fit_noise(&self, residual: &[f64], max_order: usize) -> Whitener {
         let models = (0..self.outputs)
             .map(|o| {
                 let stretches: Vec<&[f64]> =
                     self.series.iter().filter(|s| s.output == o).map(|s| &residual[s.rows.clone()]).collect();
-                fit_ar(&stretches, max_order)
+                NoiseModel::fit(&stretches, max_order)
             })
             .collect();
         Whitener { models }
@@ -68,7 +68,7 @@ impl Layout {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitener {
     /// In the order of the outputs.
-    pub models: Vec<ArModel>,
+    pub models: Vec<NoiseModel>,
 }
 
 impl Whitener {
@@ -88,11 +88,11 @@ impl Whitener {
 
     /// Sum over rows of the logarithm of the innovation's standard deviation: the determinant's share of a log likelihood.
     pub fn log_scale(&self, layout: &Layout) -> f64 {
-        layout.series.iter().map(|s| s.rows.len() as f64 * self.models[s.output].innovation().ln()).sum()
+        layout.series.iter().map(|s| self.models[s.output].log_scale(s.rows.len())).sum()
     }
 
     /// The largest order.
     pub fn order(&self) -> usize {
-        self.models.iter().map(ArModel::order).max().unwrap_or(0)
+        self.models.iter().map(NoiseModel::order).max().unwrap_or(0)
     }
 }

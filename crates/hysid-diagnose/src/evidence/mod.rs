@@ -1,7 +1,7 @@
 //! The evidence space: everything that could explain a residual, seen as columns in one whitened output space.
 //!
 //! Rows are samples of all outputs of all recordings, stacked (see [`Layout`]). A residual `e` and the response of an effect to a
-//! unit amplitude live in the same space; both are whitened by the noise's autoregressive filter ([`Whitener`]) and projected off what
+//! unit amplitude live in the same space; both are whitened by the noise model ([`Whitener`]) and projected off what
 //! the simulation's own parameters and initial states can do ([`Projector`]). What is left of the residual is judged against what is
 //! left of each effect ([`score`]), and the largest score against surrogates of the residual ([`surrogate_test`]).
 //!
@@ -11,12 +11,14 @@
 
 mod ar;
 mod layout;
+mod noise;
 mod projector;
 mod score;
 mod surrogate;
 
 pub use ar::{AR_ORDERS, ArModel, fit_ar};
 pub use layout::{Layout, Series, Whitener};
+pub use noise::{NoiseModel, SpectralShape};
 pub use projector::{Projector, dot, norm2};
 pub use score::{FeatureGroup, detectable_amplitude, score};
 pub use surrogate::{SurrogateTest, TestOptions, correlation_time, surrogate_test};

@@ -96,11 +96,11 @@ pub fn detectable_amplitude(group: &FeatureGroup, noise: f64, candidates: usize)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::{ArModel, Series};
+    use crate::evidence::{NoiseModel, Series};
 
     fn plain(n: usize) -> (Layout, Whitener) {
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        (layout, Whitener { models: vec![ArModel::white(1.0)] })
+        (layout, Whitener { models: vec![NoiseModel::white(1.0)] })
     }
 
     #[test]

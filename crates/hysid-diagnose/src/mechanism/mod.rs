@@ -47,7 +47,7 @@ pub(crate) use law::{log_grid, log_steps};
 pub use page::catalogue_page;
 pub use rewrite::{Amplitude, Reported, RewriteError, Rewritten, Shape};
 pub use sentence::{Value, number_with_unit};
-pub use signals::{Signals, excited_band};
+pub use signals::{Signals, band_but_for, excited_band};
 pub use survey::{Stretch, SurveyError, survey};
 
 /// One entry of the catalogue.

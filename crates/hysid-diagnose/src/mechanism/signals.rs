@@ -219,6 +219,11 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
 
 /// The band that holds the signal's power but for 2 % at either end, in Hz; the mean does not count.
 pub fn excited_band(u: &[f64], period_s: f64) -> (f64, f64) {
+    band_but_for(u, period_s, 0.02)
+}
+
+/// The band that holds the signal's power but for a share at either end, in Hz; the mean does not count.
+pub fn band_but_for(u: &[f64], period_s: f64, share: f64) -> (f64, f64) {
     let middle = mean(u);
     let centred: Vec<f64> = u.iter().map(|v| v - middle).collect();
     let lines = hysid_signal::fourier(&centred);
@@ -228,10 +233,10 @@ pub fn excited_band(u: &[f64], period_s: f64) -> (f64, f64) {
     let (mut low, mut high, mut sum) = (None, 0.5 / period_s, 0.0);
     for (k, p) in power.iter().enumerate() {
         sum += p;
-        if low.is_none() && sum > 0.02 * total {
+        if low.is_none() && sum > share * total {
             low = Some(k as f64 * width);
         }
-        if sum >= 0.98 * total {
+        if sum >= (1.0 - share) * total {
             high = k as f64 * width;
             break;
         }

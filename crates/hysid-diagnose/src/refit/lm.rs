@@ -256,7 +256,7 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::{ArModel, Series};
+    use crate::evidence::{NoiseModel, Series};
 
     /// `y = a exp(-b t)`, exact derivatives; diverges for b < 0.
     struct Decay {
@@ -287,7 +287,7 @@ mod tests {
         let n = 50;
         let problem = Decay { y: (0..n).map(|i| 3.0 * (-0.7 * i as f64 * 0.1).exp()).collect(), bounds };
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        let whitener = Whitener { models: vec![ArModel::white(0.1)] };
+        let whitener = Whitener { models: vec![NoiseModel::white(0.1)] };
         levenberg_marquardt(&problem, &start, &layout, &whitener, None, LmOptions::default()).unwrap()
     }
 
@@ -323,7 +323,7 @@ mod tests {
         let f = fit([1.0, 0.1], vec![(-100.0, 100.0), (-10.0, 10.0)]);
         let n = 50;
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        let whitener = Whitener { models: vec![ArModel::white(0.1)] };
+        let whitener = Whitener { models: vec![NoiseModel::white(0.1)] };
         let c = f.covariance(&layout, &whitener, None, 1.0);
         let (a, b) = (&f.jacobian[0], &f.jacobian[1]);
         let (aa, ab, bb) = (dot(a, a) / 0.01, dot(a, b) / 0.01, dot(b, b) / 0.01);

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use hysid_diagnose::file::VerdictKind;
-use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose, stand_in};
+use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 
 use self::folder::Folder;
@@ -44,6 +44,9 @@ pub struct Args {
     /// Folder for diagnosis.json, report.html and augmented.sim.toml
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Weigh this set of effects too, whatever the search finds: `MECHANISM@SLOT`, several joined by `+` (repeat for several sets)
+    #[arg(long, value_name = "EFFECTS")]
+    consider: Vec<String>,
     /// Level of the mismatch test
     #[arg(long, default_value_t = 0.01)]
     alpha: f64,
@@ -78,6 +81,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn work(args: &Args) -> Result<(), Failure> {
     let began = Instant::now();
     let options = Options { alpha: args.alpha, seed: args.seed };
+    let questions = args.consider.iter().map(|text| question(text)).collect::<Result<Vec<_>, _>>()?;
     let progress = |step: &str| eprintln!("hysid: {step} ...");
     let expired = || args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > limit);
     let hooks = Hooks { progress: &progress, expired: &expired };
@@ -87,7 +91,7 @@ fn work(args: &Args) -> Result<(), Failure> {
             let (simulation, name) = simulation_file::read(file)?;
             let intake = files.of_simulation(&simulation)?;
             let folder = Folder::claim(&args.out)?;
-            (answer(&simulation, &name, &intake, options, &hooks)?, folder)
+            (answer(&simulation, &name, &intake, &questions, options, &hooks)?, folder)
         }
         (None, Some(column)) => {
             let output = args.output.clone().unwrap_or_default();
@@ -97,7 +101,7 @@ fn work(args: &Args) -> Result<(), Failure> {
             progress("finding a clone of the simulated column");
             let stand_in =
                 stand_in(&args.input, &output, column, &intake.estimation, args.seed).map_err(Failure::bad_input)?;
-            let mut outcome = answer(&stand_in.simulation, column, &intake, options, &hooks)?;
+            let mut outcome = answer(&stand_in.simulation, column, &intake, &questions, options, &hooks)?;
             if let Some(moved) = stand_in.moved(&outcome.file.calibrated_parameters) {
                 if outcome.file.verdict == VerdictKind::NoSignificantMismatch {
                     outcome.file.summary = format!("{} {moved}", outcome.file.summary);
@@ -135,15 +139,28 @@ fn work(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
+/// A set of effects as it is typed: `coulomb_friction@state:v+delay@input:u`.
+fn question(text: &str) -> Result<Question, Failure> {
+    text.split('+')
+        .map(|effect| match effect.trim().split_once('@') {
+            Some((mechanism, slot)) if !mechanism.is_empty() && !slot.is_empty() => Ok((mechanism.into(), slot.into())),
+            _ => Err(Failure::BadInput(format!(
+                "--consider {text}: `{effect}` is not of the form MECHANISM@SLOT, such as coulomb_friction@state:v"
+            ))),
+        })
+        .collect()
+}
+
 /// The diagnosis, with a black box beside it.
 fn answer(
     simulation: &Simulation,
     file: &str,
     intake: &Intake,
+    questions: &[Question],
     options: Options,
     hooks: &Hooks<'_>,
 ) -> Result<Diagnosis, Failure> {
-    let request = Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, options };
+    let request = Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, questions, options };
     let mut outcome = diagnose(&request, hooks).map_err(|e| refused(&e, &request))?;
     if !(hooks.expired)() {
         (hooks.progress)("identifying a black box for comparison");

@@ -4,7 +4,7 @@ use hysid_plant::{Compiled, Direction, Drive, Run};
 use nalgebra::{DMatrix, DVector};
 
 use super::motion::{Bench, SAMPLES, difference, outputs, rms, with};
-use crate::evidence::{ArModel, Layout, Series, Whitener};
+use crate::evidence::{Layout, NoiseModel, Series, Whitener};
 use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals};
 use crate::refit::{LmOptions, Problem, levenberg_marquardt};
 use crate::slot::{Slot, Target};
@@ -165,7 +165,7 @@ impl<'a> SelfRecord<'a> {
             (0..target.len()).map(|o| Series { stretch: 0, output: o, first: 0, rows: o * SAMPLES..(o + 1) * SAMPLES });
         let layout = Layout { series: series.collect(), outputs: target.len() };
         let sizes = target.iter().map(|y| rms(y.iter().copied()).max(f64::MIN_POSITIVE));
-        let whitener = Whitener { models: sizes.map(ArModel::white).collect() };
+        let whitener = Whitener { models: sizes.map(NoiseModel::white).collect() };
         Self { compiled, drive, target, fitted, bounds, layout, whitener }
     }
 

@@ -1,0 +1,198 @@
+//! The search for a set of effects: calibration of what there is, test, refit of the likeliest, composition.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::base::Base;
+use crate::compose::{
+    Hypothesis, Key, SearchOptions, Setting, add, block_score, compose, refit, refit_all, short_list,
+};
+use crate::error::DiagnoseError;
+use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
+use crate::mechanism::Mechanism;
+use crate::model::{Model, Values};
+use crate::pipeline::{Hooks, Options, Question, Request};
+use crate::screen::{Candidate, screen};
+use crate::slot::Slot;
+
+/// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
+pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Base<'d>, DiagnoseError> {
+    let simulation = request.simulation;
+    let bad =
+        |e: hysid_plant::Error| DiagnoseError::Simulation { file: request.file.to_owned(), problem: e.to_string() };
+    let model = Model::new(simulation, setting.data, &setting.own_states, setting.substeps).map_err(bad)?;
+    let start = model.theta(&Values::default());
+    let diverged = model.simulate(&start).1;
+    let mut best: Option<Base<'d>> = None;
+    let (starts, substeps) = crate::calibrate::starts(&model, simulation, request.options.seed);
+    setting.substeps = substeps;
+    for from in starts {
+        let Some(b) = setting.fit(simulation, &from, None, 1, 25) else { continue };
+        let cost = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual);
+        if best.as_ref().is_none_or(|x| cost(&b) < cost(x)) {
+            best = Some(b);
+        }
+    }
+    let Some(best) = best else {
+        let (stretch, sample) = diverged.unwrap_or((0, 0));
+        let s = &setting.data.stretches[stretch];
+        return Err(DiagnoseError::Explodes {
+            file: request.file.to_owned(),
+            recording: setting.data.recordings[s.recording].clone(),
+            at_s: s.start_s + sample as f64 * setting.data.period_s,
+        });
+    };
+    // Under its own noise, twice.
+    let polished = setting.fit(simulation, &best.values(), Some(&best.whitener), 2, 20);
+    Ok(match polished {
+        Some(p) if p.log_likelihood > best.log_likelihood => p,
+        _ => best,
+    })
+}
+
+/// Composition goes on while the mismatch that remains is significant at this level.
+const STOP_LEVEL: f64 = 0.02;
+/// Sets that are carried from one noise model to another.
+const MOST_CARRIED: usize = 8;
+/// Candidates that are refitted alone.
+const SHORT_LIST: usize = 10;
+
+/// A search for sets of effects on one calibrated simulation.
+pub struct Search<'a, 'd> {
+    /// What all fits share.
+    pub setting: &'a Setting<'d>,
+    /// Level and seed of the tests.
+    pub options: Options,
+    /// Progress and time.
+    pub hooks: &'a Hooks<'a>,
+    /// Tests of what remains, by statement: composition and the verdict ask for the same ones.
+    tests: RefCell<BTreeMap<Key, SurrogateTest>>,
+}
+
+impl<'a, 'd> Search<'a, 'd> {
+    /// A search that has found nothing yet.
+    pub fn new(setting: &'a Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
+        Self { setting, options, hooks, tests: RefCell::default() }
+    }
+
+    /// The simulation without effects under this search's noise model, and what could be missing in it.
+    pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
+        let base = self.setting.fit(&self.setting.original, &none.base.values(), None, 2, 25)?;
+        let log_evidence = self.setting.evidence(&base);
+        let start = Hypothesis { effects: Vec::new(), base, log_evidence };
+        let candidates = screen(&start.base, &self.setting.original, &start.base.evidence(), &|_, _| true);
+        Some((start, candidates))
+    }
+
+    /// Every set of effects that was fitted: the short list, the numerics, and what composition made of them.
+    pub fn sets(&self, none: &Hypothesis<'d>, candidates: &[Candidate]) -> Vec<Hypothesis<'d>> {
+        let mut pool = Vec::new();
+        self.extend(none, candidates, &mut pool);
+        pool
+    }
+
+    /// As [`Search::sets`], with sets that are there already.
+    pub fn extend(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
+        (self.hooks.progress)("refitting the likeliest effects");
+        for h in refit_all(self.setting, none, &short_list(candidates, SHORT_LIST)) {
+            add(pool, h);
+        }
+        if let Some(h) = crate::numerics_check::artefact(self.setting, none) {
+            add(pool, h);
+        }
+        (self.hooks.progress)("looking for a second and third effect");
+        let unexplained = |h: &Hypothesis<'_>| self.remains(h).p_value < STOP_LEVEL;
+        let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
+        compose(self.setting, none, pool, bounds, &unexplained, self.hooks.expired);
+    }
+
+    /// The likeliest of these sets, which were found under another noise model, fitted under this search's.
+    pub fn under_noise(&self, none: &Hypothesis<'d>, sets: &[Hypothesis<'d>]) -> Vec<Hypothesis<'d>> {
+        let mut order: Vec<&Hypothesis<'d>> = sets.iter().collect();
+        order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        order
+            .into_par_iter()
+            .take(MOST_CARRIED)
+            .filter_map(|h| {
+                let document = h.base.model.simulation();
+                let base = self.setting.fit(document, &h.base.values(), None, 3, self.setting.iterations)?;
+                let log_evidence = self.setting.evidence(&base);
+                (base.log_likelihood > none.base.log_likelihood).then(|| Hypothesis {
+                    effects: h.effects.clone(),
+                    base,
+                    log_evidence,
+                })
+            })
+            .collect()
+    }
+
+    /// The set that a question names, fitted one effect after the other; `None` where one of them cannot be fitted.
+    ///
+    /// # Errors
+    /// A mechanism that is not in the catalogue, or a slot that the simulation does not have for it.
+    pub fn answer(&self, none: &Hypothesis<'d>, question: &Question) -> Result<Option<Hypothesis<'d>>, DiagnoseError> {
+        let mut set: Option<Hypothesis<'d>> = None;
+        for (mechanism, slot) in question {
+            let parent = set.as_ref().unwrap_or(none);
+            let evidence = parent.base.evidence();
+            let wanted = |m: &Mechanism, s: &Slot| m.id == *mechanism && s.label == *slot;
+            let found = screen(&parent.base, &self.setting.original, &evidence, &wanted);
+            let Some(candidate) = found.first() else {
+                return Err(DiagnoseError::Question(format!("{mechanism}@{slot}")));
+            };
+            let Some(h) = refit(self.setting, parent, candidate, None) else { return Ok(None) };
+            set = Some(h);
+        }
+        Ok(set)
+    }
+
+    /// The test of what remains of a hypothesis' residual.
+    pub fn remains(&self, h: &Hypothesis<'_>) -> SurrogateTest {
+        let mut key = h.key();
+        // A better fit of the same statement is tested anew.
+        key.push(("", format!("{:.3}", h.log_evidence)));
+        if let Some(known) = self.tests.borrow().get(&key) {
+            return known.clone();
+        }
+        let evidence = h.base.evidence();
+        let rest = screen(&h.base, &self.setting.original, &evidence, &|_, _| true);
+        let test = self.test(&rest, &h.base, &evidence);
+        self.tests.borrow_mut().insert(key, test.clone());
+        test
+    }
+
+    /// The mismatch test over all candidates' kept columns.
+    pub fn test(&self, candidates: &[Candidate], base: &Base<'_>, evidence: &(Projector, Vec<f64>)) -> SurrogateTest {
+        let groups: Vec<&FeatureGroup> =
+            candidates.iter().flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref())).collect();
+        let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed };
+        surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, options)
+    }
+
+    /// A second look where the surrogates see nothing: they are made of the residual itself, and where nearly all of it is the effect
+    /// they carry the effect's shape. The likeliest effects are refitted; one that takes [`LARGE`] of the residual's power and predicts
+    /// blocks that it was not fitted to better is no accident.
+    ///
+    /// Returns the p-value of the difference on the blocks, corrected for the number of effects tried.
+    pub fn second_look(&self, none: &Hypothesis<'d>, candidates: &[Candidate]) -> Option<f64> {
+        let list = short_list(candidates, 3);
+        let fitted = refit_all(self.setting, none, &list);
+        let rows = self.setting.data.rows() as f64;
+        let least = -0.5 * rows * (1.0 - LARGE).ln();
+        let best = fitted.first().filter(|h| h.base.log_likelihood > none.base.log_likelihood + least)?;
+        let (_, before) = block_score(self.setting, none)?;
+        let (_, after) = block_score(self.setting, best)?;
+        let p = crate::weigh::better_by_chance(&before, &after)? * list.len() as f64;
+        (p < self.options.alpha).then_some(p)
+    }
+}
+
+/// A question as it was typed.
+pub fn words(question: &Question) -> String {
+    question.iter().map(|(m, s)| format!("{m}@{s}")).collect::<Vec<_>>().join("+")
+}
+
+/// Share of the whitened residual's power that an effect must take to count without the surrogates.
+const LARGE: f64 = 0.25;

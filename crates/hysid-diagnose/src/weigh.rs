@@ -1,0 +1,129 @@
+//! Weighing fitted hypotheses: evidence, blocks that were held out of the fit, and what a law that contains another must pay.
+
+use rayon::prelude::*;
+
+use crate::compose::{Hypothesis, Setting, best_of, block_score};
+use crate::mechanism::Mechanism;
+use crate::slot::Slot;
+use crate::verdict::{Claim, Hypothesis as Weighed};
+
+/// Weight of the log evidence in the probabilities.
+pub const EVIDENCE_WEIGHT: f64 = 0.4;
+/// The same where something significant is left of the best set: all models are then known to be wrong.
+pub const IMPERFECT_WEIGHT: f64 = 0.2;
+/// Log likelihood below which a law that contains another has gained nothing on it, and the weight of the evidence between the two.
+const NESTED_GAIN: f64 = 2.0;
+const NESTED_WEIGHT: f64 = 0.9;
+/// Log evidence that a further effect must bring before it counts.
+const PRICE_OF_AN_EFFECT: f64 = 4.0;
+
+pub fn claim(mechanism: &Mechanism, slot: &Slot) -> Claim {
+    Claim { mechanism: mechanism.id, family: mechanism.family.name(), slot: slot.label.clone() }
+}
+
+pub fn weigh(h: &Hypothesis<'_>) -> Weighed {
+    Weighed {
+        claims: h.effects.iter().map(|e| claim(e.mechanism, &e.slot)).collect(),
+        log_evidence: h.log_evidence - PRICE_OF_AN_EFFECT * h.effects.len() as f64,
+    }
+}
+
+/// The likeliest set that names another mechanism than the winner.
+pub fn rival_of(pool: &[Hypothesis<'_>], weighed: &[Weighed], winner: usize) -> Option<usize> {
+    let names = |i: usize, id: &str| pool[i].effects.iter().any(|e| e.mechanism.id == id);
+    (0..pool.len())
+        .filter(|&i| pool[i].effects.iter().any(|e| !names(winner, e.mechanism.id)))
+        .max_by(|&a, &b| weighed[a].log_evidence.total_cmp(&weighed[b].log_evidence))
+}
+
+/// Scores on held-out blocks of the hypotheses that are close to the best; `None` for the others.
+pub fn block_scores(
+    setting: &Setting<'_>,
+    pool: &[Hypothesis<'_>],
+    expired: &(dyn Fn() -> bool + Sync),
+) -> Vec<Option<(f64, Vec<f64>)>> {
+    let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut near: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].log_evidence > top - 8.0).collect();
+    near.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
+    near.truncate(5);
+    (0..pool.len())
+        .into_par_iter()
+        .map(|i| {
+            if (near.contains(&i) || i == 0) && pool.len() > 1 && !expired() {
+                block_score(setting, &pool[i])
+            } else {
+                None
+            }
+        })
+        .collect()
+}
+
+/// The standing set, or one of its size that ties in evidence and predicts the held-out blocks better.
+pub fn tie_broken(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>]) -> usize {
+    let Some(standing) = best_of(pool) else { return 0 };
+    let score = |i: usize| blocks[i].as_ref().map_or(f64::NEG_INFINITY, |b| b.0);
+    (0..pool.len())
+        .filter(|&i| {
+            pool[i].effects.len() == pool[standing].effects.len()
+                && pool[i].log_evidence > pool[standing].log_evidence - 3.0
+        })
+        .filter(|&i| i == standing || score(i) > score(standing) + 3.0)
+        .max_by(|&a, &b| score(a).total_cmp(&score(b)))
+        .unwrap_or(standing)
+}
+
+/// Mean and standard error of `a - b` over stretches of 20 rows (neighbouring errors are no independent witnesses); `None` for
+/// fewer than five stretches.
+fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
+    let differences: Vec<f64> =
+        a.chunks(20).zip(b.chunks(20)).map(|(a, b)| a.iter().sum::<f64>() - b.iter().sum::<f64>()).collect();
+    let count = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / count.max(1.0);
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    (count > 4.0).then_some((mean, (variance / count).sqrt()))
+}
+
+/// Whether the winner predicts the held-out blocks worse than the simulation as it is, by more than two standard errors.
+pub fn worse_on_blocks(blocks: &[Option<(f64, Vec<f64>)>], winner: usize) -> bool {
+    let (Some(Some((_, none))), Some(Some((_, best)))) = (blocks.first(), blocks.get(winner)) else { return false };
+    difference(best, none).is_some_and(|(mean, error)| mean > 2.0 * error)
+}
+
+/// Probability that squared errors on blocks fall by so much by chance, one-sided; `None` where the blocks are too few.
+pub fn better_by_chance(before: &[f64], after: &[f64]) -> Option<f64> {
+    let (mean, error) = difference(before, after)?;
+    let t = mean / error.max(f64::MIN_POSITIVE);
+    let count = before.chunks(20).count() as f64;
+    let law = statrs::distribution::StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
+    Some(1.0 - statrs::distribution::ContinuousCDF::cdf(&law, t))
+}
+
+/// Logarithms of the weights of the hypotheses.
+///
+/// Evidence counts with `weight`; what the held-out blocks say is part of it. A law that contains the winner's as a special case and gains
+/// nothing on it pays nearly the full price of its further parameters: data that settle a parameter at its neutral value do speak.
+pub fn log_weights(
+    pool: &[Hypothesis<'_>],
+    blocks: &[Option<(f64, Vec<f64>)>],
+    winner: usize,
+    weight: f64,
+) -> Vec<f64> {
+    let best_block = blocks[winner].as_ref().map(|b| b.0);
+    let best = &pool[winner];
+    pool.iter()
+        .enumerate()
+        .map(|(i, h)| {
+            let mut log = weight * (h.log_evidence - PRICE_OF_AN_EFFECT * h.effects.len() as f64);
+            if let (Some(own), Some(best)) = (&blocks[i], best_block) {
+                log += 0.5 * weight * (own.0 - best).clamp(-10.0, 10.0);
+            }
+            let gain = h.base.log_likelihood - best.base.log_likelihood;
+            let contains =
+                h.effects.iter().any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
+            if i != winner && h.effects.len() == best.effects.len() && contains && gain < NESTED_GAIN {
+                log += (NESTED_WEIGHT - weight).max(0.0) * (h.log_evidence - best.log_evidence).min(0.0);
+            }
+            log
+        })
+        .collect()
+}
