@@ -82,8 +82,15 @@ pub fn log_likelihood(data: &DataSet, noise: &Whitener, residual: &[f64]) -> f64
 
 /// A noise whose innovations are a smaller share of it than this is no noise: something moves the output slowly and smoothly.
 const GROSS: f64 = 0.1;
+/// Innovations of white noise are the noise; below this share something is left that a further effect may explain.
+const COLOURED: f64 = 0.85;
 
 impl Base<'_> {
+    /// Whether a good part of the residual can be told from its own past: coloured noise, or mismatch.
+    pub fn coloured(&self) -> bool {
+        self.whitener.models.iter().any(|m| m.innovation() < COLOURED * m.noise_rms())
+    }
+
     /// Whether the residual is mismatch throughout: its own past predicts it too well for noise.
     pub fn gross(&self) -> bool {
         self.whitener.models.iter().any(|m| m.innovation() < GROSS * m.noise_rms())

@@ -4,9 +4,9 @@ use hysid_plant::{Expr, Simulation, Unit};
 use hysid_signal::power_spectrum;
 
 use crate::base::Base;
-use crate::compose::Hypothesis;
 use crate::data::DataSet;
 use crate::hold::FreeRun;
+use crate::hypothesis::Hypothesis;
 use crate::mechanism::Block;
 use crate::picture::{LawPicture, MapPicture, ParameterPicture, Picture, RecordPicture, Role, SpectrumPicture};
 use crate::screen::along;

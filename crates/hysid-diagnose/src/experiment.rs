@@ -11,10 +11,10 @@ use hysid_signal::Excitation;
 use rayon::prelude::*;
 
 use crate::base::Base;
-use crate::compose::{Hypothesis, Setting};
 use crate::data::DataSet;
 use crate::evidence::{Whitener, norm2};
 use crate::file::ExperimentRecord;
+use crate::hypothesis::{Hypothesis, Setting};
 use crate::mechanism::excited_band;
 use crate::model::{Model, Values};
 use crate::refit::{LmOptions, levenberg_marquardt};

@@ -1,6 +1,6 @@
 //! Is it the simulation's own numerics? Variants of step, hold, clock and smoothing, fitted like any other explanation.
 
-use crate::compose::{Effect, Hypothesis, Setting};
+use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::Rewritten;
 use crate::mechanism::numerics::{SOLVER_ARTEFACT, variants};
 use crate::slot::{Slot, Structure};

@@ -4,14 +4,16 @@ use hysid_plant::Simulation;
 use hysid_signal::Recording;
 
 use crate::base::NoiseKind;
-use crate::compose::{Hypothesis, Setting, add, best_of};
+use crate::compose::{add, best_of};
 use crate::data::{DataSet, held_out_blocks};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
 use crate::evidence::correlation_time;
 use crate::experiment::{present_separation, propose};
 use crate::file::*;
+use crate::fitting::is_far;
 use crate::hold::free_run;
+use crate::hypothesis::{Hypothesis, Setting};
 use crate::openset::correction;
 use crate::picture::Picture;
 use crate::records::*;
@@ -167,7 +169,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let tau = correlation_time(&data.layout, &none.base.fit.residual);
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(&plain, options, hooks);
-    let mut gross = if none.base.gross() { plainly.start(&none) } else { None };
+    let mut gross = if none.base.gross() || is_far(&none.base) { plainly.start(&none) } else { None };
     if let (Some((start, found)), true) = (&gross, test.p_value >= options.alpha)
         && !(hooks.expired)()
         && let Some(p) = plainly.second_look(start, found)

@@ -6,11 +6,11 @@ use hysid_plant::Simulation;
 
 use crate::base::Base;
 use crate::bootstrap::{ratio_of_rms, rms};
-use crate::compose::Hypothesis;
 use crate::data::DataSet;
 use crate::evidence::{FeatureGroup, detectable_amplitude};
 use crate::file::*;
 use crate::hold::FreeRun;
+use crate::hypothesis::Hypothesis;
 use crate::locate;
 use crate::mechanism::number_with_unit;
 use crate::pipeline::Question;

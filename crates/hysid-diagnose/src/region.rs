@@ -2,8 +2,8 @@
 
 use hysid_plant::Expr;
 
-use crate::compose::Hypothesis;
 use crate::evidence::Projector;
+use crate::hypothesis::Hypothesis;
 use crate::locate::{Coordinate, region};
 use crate::screen::along;
 

@@ -3,8 +3,8 @@
 use hysid_plant::{ClockSource, Compiled, Drive, Expr, Input, Output, Run, Simulation};
 
 use crate::base::Base;
-use crate::compose::Effect;
 use crate::file::{ParameterRecord, finite};
+use crate::hypothesis::Effect;
 use crate::mechanism::Value;
 
 /// Values of expressions of parameters only.

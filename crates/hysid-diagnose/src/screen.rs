@@ -14,6 +14,8 @@ use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, catalogue};
 use crate::model::{Model, Values};
 use crate::slot::{Slot, Structure};
 
+/// Points of a candidate whose columns are kept for pairs.
+pub const JOINT: usize = 2;
 /// Points of a candidate whose columns take part in the mismatch test.
 pub const KEPT: usize = 6;
 
@@ -27,6 +29,8 @@ pub struct Point {
     pub shapes: Vec<(String, f64)>,
     /// Its columns in the evidence space; kept for a spread of at most [`KEPT`] points, chosen without looking at the residual.
     pub group: Option<FeatureGroup>,
+    /// Its columns, kept for the best points that are no neighbours: pairs of candidates are judged by them.
+    pub joint: Option<FeatureGroup>,
     /// Share of its response that the simulation's own parameters absorb.
     pub concealment: f64,
     /// Norm of its first amplitude's response outside the tangent space.
@@ -189,6 +193,7 @@ pub fn screen(
             let refit = mechanism.rewrite(&document, slot, signals, Purpose::Refit).ok()?;
             let mut points = features(base, &screening, slot, &values, own, r, total)?;
             points.sort_by(|a, b| b.score.total_cmp(&a.score));
+            points.iter_mut().skip(JOINT).for_each(|p| p.joint = None);
             Some(Candidate { mechanism, slot: (*slot).clone(), refit, points, lacking: mechanism.lacking(signals) })
         })
         .collect();
@@ -235,7 +240,8 @@ fn features(
         let (concealment, norm) = (group.concealment, group.norm);
         points.push(Point {
             shapes: shapes.clone(),
-            group: (i % every == every / 2).then_some(group),
+            group: (i % every == every / 2).then(|| group.clone()),
+            joint: Some(group),
             concealment,
             norm,
             amplitudes,

@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::base::Base;
-use crate::compose::{
-    Hypothesis, Key, SearchOptions, Setting, add, block_score, compose, refit, refit_all, short_list,
-};
+use crate::compose::{SearchOptions, add, compose, short_list};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
+use crate::fitting::{refit, refit_all};
+use crate::hypothesis::{Hypothesis, Key, Setting, block_score};
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
 use crate::pipeline::{Hooks, Options, Question, Request};
@@ -56,6 +56,9 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
 const STOP_LEVEL: f64 = 0.02;
 /// Sets that are carried from one noise model to another.
 const MOST_CARRIED: usize = 8;
+/// Composition goes on too while a candidate scores this much around a hypothesis: surrogates of a residual that is mostly mismatch score as
+/// high as the mismatch itself, and their p-value says nothing.
+const STOP_SCORE: f64 = 25.0;
 /// Candidates that are refitted alone.
 const SHORT_LIST: usize = 10;
 
@@ -103,9 +106,12 @@ impl<'a, 'd> Search<'a, 'd> {
             add(pool, h);
         }
         (self.hooks.progress)("looking for a second and third effect");
-        let unexplained = |h: &Hypothesis<'_>| self.remains(h).p_value < STOP_LEVEL;
+        let unexplained = |h: &Hypothesis<'_>| {
+            let test = self.remains(h);
+            test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured()
+        };
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
-        compose(self.setting, none, pool, bounds, &unexplained, self.hooks.expired);
+        compose(self.setting, none, candidates, pool, bounds, &unexplained, self.hooks.expired);
     }
 
     /// The likeliest of these sets, which were found under another noise model, fitted under this search's.
@@ -177,10 +183,10 @@ impl<'a, 'd> Search<'a, 'd> {
     ///
     /// Returns the p-value of the difference on the blocks, corrected for the number of effects tried.
     pub fn second_look(&self, none: &Hypothesis<'d>, candidates: &[Candidate]) -> Option<f64> {
-        let list = short_list(candidates, 3);
+        let list = short_list(candidates, 5);
         let fitted = refit_all(self.setting, none, &list);
         let rows = self.setting.data.rows() as f64;
-        let least = -0.5 * rows * (1.0 - LARGE).ln();
+        let least = -0.5 * self.setting.noise.share() * rows * (1.0 - LARGE).ln();
         let best = fitted.first().filter(|h| h.base.log_likelihood > none.base.log_likelihood + least)?;
         let (_, before) = block_score(self.setting, none)?;
         let (_, after) = block_score(self.setting, best)?;

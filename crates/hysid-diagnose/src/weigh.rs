@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::compose::{Hypothesis, Setting, best_of, block_score};
+use crate::compose::best_of;
+use crate::hypothesis::{Hypothesis, Setting, block_score};
 use crate::mechanism::Mechanism;
 use crate::slot::Slot;
 use crate::verdict::{Claim, Hypothesis as Weighed};

@@ -232,7 +232,12 @@ impl Simulation {
             return parameter.unit.clone();
         }
         if let Some(state) = self.state(symbol) {
-            return state.unit.clone();
+            // A state that is written out as it stands has the unit of its column.
+            let column = || {
+                let own = |o: &&Output| matches!(&o.expression, Expr::Symbol(s) if s == symbol);
+                self.outputs.iter().find(own).and_then(|o| Unit::of_column(&o.column))
+            };
+            return state.unit.clone().or_else(column);
         }
         Unit::of_column(&self.input(symbol)?.column)
     }

@@ -10,10 +10,11 @@ pub static POWER_LAW_DAMPING: Mechanism = Mechanism {
     block: Block::Damping,
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("v"),
-    already: &["abs(v)^P", "(abs(v)/P)^Q"],
+    already: &["abs(v)^P", "(abs(v)/P)^Q", "((v/P)^2 + Q)^((R - 1)/2)"],
     law: |_, _| {
-        // The reference speed keeps the unit of F_p whatever the power.
-        Law::force("F_p*sign(v)*(abs(v)/v_r)^p_v")
+        // The reference speed keeps the unit of F_p whatever the power. Below two hundredths of it the law is smooth: the derivative of a
+        // power below one is infinite at rest, and no fit survives that.
+        Law::force("F_p*v/v_r*((v/v_r)^2 + 0.0004)^((p_v - 1)/2)")
             .amplitude("F_p", "F", -0.5, 1.0)
             .constant("v_r", "v", Grid::Values(vec![1.0]))
             .shape("p_v", "1", Grid::Values(vec![0.3, 0.5, 1.5, 2.5]))

@@ -8,8 +8,8 @@ pub static COGGING: Mechanism = Mechanism {
     id: "cogging",
     family: Family::PositionRipple,
     block: Block::Restoring,
-    places: &[Place::Force],
-    applies: |slot| slot.has("x") && slot.has("v"),
+    places: &[Place::Force, Place::ForceLaw],
+    applies: |slot| slot.has("x"),
     already: &["sin(2*pi*x/P)", "sin(2*pi/P*x)", "sin(P*x)", "sin(P*x + Q)"],
     law: |_, _| {
         Law::force("A_s*sin(2*pi*x/p_x) + A_c*cos(2*pi*x/p_x)")

@@ -1,0 +1,348 @@
+//! Fitting effects: from a candidate of the screening, or a list of them, to a hypothesis.
+//!
+//! A few iterations tell who is hopeless; the others are fitted from several starts. Shapes that least squares cannot move (a time, a period,
+//! a knee) are searched line by line with the other unknowns refitted.
+
+use rayon::prelude::*;
+
+use crate::base::Base;
+use crate::evidence::norm2;
+use crate::hypothesis::{Effect, Hypothesis, Setting};
+use crate::mechanism::Mechanism;
+use crate::model::Values;
+use crate::screen::{Candidate, rewrite_at, with_added_starts};
+
+/// Points of a shape grid that a refit starts from.
+const MOST_POINTS: usize = 3;
+
+/// Starts of a refit: the best points of the grid that are no neighbours of each other, and the gentlest.
+fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
+    let named = |point: &crate::screen::Point| -> Vec<(String, f64)> {
+        let mut values = point.shapes.clone();
+        for (name, amplitude) in &point.amplitudes {
+            values.push((name.clone(), *amplitude));
+        }
+        values
+    };
+    let mut out: Vec<Vec<(String, f64)>> = Vec::new();
+    let Some(best) = candidate.points.first() else { return out };
+    out.push(named(best));
+    let far = |a: &[(String, f64)], b: &[(String, f64)]| {
+        a.iter().zip(b).any(|((_, x), (_, y))| (x - y).abs() > 0.6 * x.abs().max(y.abs()))
+    };
+    let mut apart = vec![best];
+    for p in &candidate.points[1..] {
+        if apart.len() < MOST_POINTS && apart.iter().all(|q| far(&p.shapes, &q.shapes)) {
+            apart.push(p);
+            out.push(named(p));
+        }
+    }
+    if candidate.refit.amplitudes.is_empty() && !candidate.refit.neutral.is_empty() {
+        // Only shapes: the effect's strength is in them, and the point's weight says how strong.
+        let weight = best.amplitudes.first().map_or(1.0, |a| a.1.clamp(0.05, 1.0));
+        let neutral = |name: &str| candidate.refit.neutral.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
+        out.push(best.shapes.iter().map(|(n, v)| (n.clone(), neutral(n) + weight.sqrt() * (v - neutral(n)))).collect());
+    }
+    out
+}
+
+/// Share of the output that a residual has where the simulation's fit without the effect says little of its parameters.
+const FAR: f64 = 0.3;
+
+/// Whether a simulation is so far from the recording that its parameters say little.
+pub fn is_far(base: &Base<'_>) -> bool {
+    let data = base.model.data();
+    let mean = data.y.iter().sum::<f64>() / data.rows().max(1) as f64;
+    let power: f64 = data.y.iter().map(|y| (y - mean).powi(2)).sum();
+    norm2(&base.fit.residual) > FAR * FAR * power
+}
+
+/// A few iterations from a candidate's best start; from the user's own parameters too where the fit without the effect is far off.
+fn sketch<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
+    let froms = starting_values(setting, parent, candidate);
+    let own = if is_far(&parent.base) { froms.last().filter(|_| froms.len() > 1) } else { None };
+    let base = froms
+        .first()
+        .into_iter()
+        .chain(own)
+        .filter_map(|from| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, 3))
+        .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
+    Some(hypothesis(setting, parent, candidate, base))
+}
+
+/// The parent's values with each of the candidate's starts; the last one has the simulation's parameters as the user gave them where the
+/// parent has no effect yet.
+fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
+    let document = &candidate.refit.simulation;
+    let values =
+        with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
+    let with = |values: &Values, start: Vec<(String, f64)>| {
+        let mut from = values.clone();
+        for (name, x) in start {
+            if let Some(p) = document.parameter(&name) {
+                from.parameters.insert(name, x.clamp(p.lower(), p.upper()));
+            }
+        }
+        from
+    };
+    let starts = starts(candidate);
+    let mut out: Vec<Values> = starts.iter().map(|s| with(&values, s.clone())).collect();
+    if parent.effects.is_empty()
+        && let Some(best) = starts.into_iter().next()
+    {
+        let mut own = values.clone();
+        for p in setting.original.parameters.iter().filter(|p| !p.fixed) {
+            own.parameters.insert(p.name.clone(), p.value);
+        }
+        out.push(with(&own, best));
+    }
+    out
+}
+
+/// Refits one candidate on top of a hypothesis' simulation; `begun` is a fit from its best start that has not converged.
+pub fn refit<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    begun: Option<Base<'d>>,
+) -> Option<Hypothesis<'d>> {
+    let document = &candidate.refit.simulation;
+    let mut froms = starting_values(setting, parent, candidate);
+    if let (Some(b), Some(first)) = (&begun, froms.first_mut()) {
+        *first = b.values();
+    }
+    let mut best: Option<Base<'d>> = begun;
+    for (i, from) in froms.into_iter().enumerate() {
+        // Another start must come near the best in a few iterations to be followed.
+        let brief = if i == 0 { setting.iterations } else { 5 };
+        let Some(mut base) = setting.fit(document, &from, Some(&parent.base.whitener), 1, brief) else {
+            continue;
+        };
+        if i > 0 && best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood - 10.0) {
+            let longer = setting.fit(document, &base.values(), Some(&parent.base.whitener), 1, setting.iterations);
+            base = longer.unwrap_or(base);
+        }
+        if best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood) {
+            best = Some(base);
+        }
+    }
+    let mut h = hypothesis(setting, parent, candidate, best?);
+    finish(setting, &mut h, parent.effects.len());
+    Some(h)
+}
+
+/// The end of a fit: shapes that least squares cannot move, of the effects from `from` on, then a round under the hypothesis' own noise.
+fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
+    for index in from..h.effects.len() {
+        profile_shapes(setting, h, index);
+    }
+    let document = h.base.model.simulation();
+    let polished = setting.fit(document, &h.base.values(), Some(&h.base.whitener), 1, setting.iterations);
+    if let Some(p) = polished
+        && p.log_likelihood > h.base.log_likelihood
+    {
+        h.base = p;
+    }
+    h.log_evidence = setting.evidence(&h.base);
+}
+
+/// A fitted candidate as a hypothesis.
+fn hypothesis<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    base: Base<'d>,
+) -> Hypothesis<'d> {
+    let mut effects = parent.effects.clone();
+    effects.push(Effect {
+        mechanism: candidate.mechanism,
+        slot: candidate.slot.clone(),
+        written: candidate.refit.clone(),
+        concealment: candidate.concealment(),
+    });
+    let log_evidence = setting.evidence(&base);
+    Hypothesis { effects, base, log_evidence }
+}
+
+/// Line search over shapes that least squares cannot move: where the derivative by the shape vanishes or the shape stands where it began,
+/// its neighbourhood in the grid is searched by shrinking steps, the other unknowns refitted at each.
+fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usize) {
+    let whole = h.base.model.simulation().clone();
+    let effect = h.effects[index].clone();
+    for shape in &effect.written.shapes {
+        if !crate::screen::needs_profile(effect.mechanism.id, &shape.name) || shape.grid.len() < 3 {
+            continue;
+        }
+        let mut document = whole.clone();
+        let Some(p) = document.parameter_mut(&shape.name) else { continue };
+        let (low, high) = (p.lower(), p.upper());
+        p.fixed = true;
+        let here = |b: &Base<'_>| b.values().parameters.get(&shape.name).copied().unwrap_or(0.0);
+        let spacing = shape.grid.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+        let mut step = 0.5 * spacing;
+        let mut moved = false;
+        for _ in 0..6 {
+            let x = here(&h.base);
+            let trials: Vec<Option<Base<'d>>> = [x - step, x + step]
+                .into_par_iter()
+                .map(|value| {
+                    if value < low || value > high {
+                        return None;
+                    }
+                    let mut d = document.clone();
+                    if let Some(p) = d.parameter_mut(&shape.name) {
+                        p.value = value;
+                    }
+                    let mut from = h.base.values();
+                    from.parameters.insert(shape.name.clone(), value);
+                    setting.fit(&d, &from, Some(&h.base.whitener), 1, 3)
+                })
+                .collect();
+            let better = trials
+                .into_iter()
+                .flatten()
+                .filter(|t| t.log_likelihood > h.base.log_likelihood + 1e-3)
+                .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
+            match better {
+                Some(t) => (h.base, moved) = (t, true),
+                None => step *= 0.4,
+            }
+        }
+        if moved {
+            // Back to the document in which the shape is an unknown again.
+            for iterations in [2, 0] {
+                let values = h.base.values();
+                if let Some(b) = setting.fit(&whole, &values, Some(&h.base.whitener), 1, iterations)
+                    && (b.log_likelihood >= h.base.log_likelihood || iterations == 0)
+                {
+                    h.base = b;
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// Log evidence by which a candidate may trail after a few iterations and still be refitted to the end.
+const HOPELESS: f64 = 40.0;
+
+/// Refits a short list on top of a hypothesis, in parallel, best evidence first.
+///
+/// A few iterations from the best start tell who is hopeless; the others are refitted to the end, from all their starts.
+pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Candidate]) -> Vec<Hypothesis<'d>> {
+    let first: Vec<Option<Hypothesis<'d>>> = list.par_iter().map(|c| sketch(setting, parent, c)).collect();
+    let mut order: Vec<f64> = first.iter().flatten().map(|h| h.log_evidence).collect();
+    order.sort_by(|a, b| b.total_cmp(a));
+    let best = order.first().copied().unwrap_or(f64::NEG_INFINITY);
+    let fourth = order.get(3).copied().unwrap_or(f64::NEG_INFINITY);
+    let threshold = (best - HOPELESS).min(fourth);
+    let mut out: Vec<Hypothesis<'d>> = list
+        .par_iter()
+        .zip(first)
+        .filter_map(|(c, sketched)| match sketched {
+            Some(h) if h.log_evidence < threshold => Some(h),
+            Some(h) => refit(setting, parent, c, Some(h.base)),
+            None => refit(setting, parent, c, None),
+        })
+        .collect();
+    out.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    out
+}
+
+/// An effect to be written: the mechanism, the slot's name, values of its parameters in the order of the law.
+pub struct Part {
+    /// The mechanism.
+    pub mechanism: &'static Mechanism,
+    /// The slot.
+    pub slot: String,
+    /// Start values of amplitudes, then shapes; missing ones stay as the law has them.
+    pub values: Vec<Option<f64>>,
+    /// Share that the simulation's own parameters absorb, from the screening.
+    pub concealment: Option<f64>,
+}
+
+impl Part {
+    /// A candidate at a point of its grid, `amplitudes` as they explain the residual.
+    pub fn of_candidate(candidate: &Candidate, point: usize, amplitudes: &[(String, f64)]) -> Self {
+        let start = starts(candidate).into_iter().next().unwrap_or_default();
+        let shapes = candidate.points.get(point).map_or(&[][..], |p| &p.shapes);
+        let find = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+        let values = candidate.refit.parameters_of();
+        Self {
+            mechanism: candidate.mechanism,
+            slot: candidate.slot.label.clone(),
+            values: values
+                .iter()
+                .map(|n| find(amplitudes, n).or_else(|| find(shapes, n)).or_else(|| find(&start, n)))
+                .collect(),
+            concealment: candidate.concealment(),
+        }
+    }
+
+    /// An effect of a fitted hypothesis, as it stands.
+    pub fn of_effect(effect: &Effect, values: &Values) -> Self {
+        Self {
+            mechanism: effect.mechanism,
+            slot: effect.slot.label.clone(),
+            values: effect.written.parameters_of().iter().map(|n| values.parameters.get(n).copied()).collect(),
+            concealment: effect.concealment,
+        }
+    }
+}
+
+/// Several effects written into the simulation of `none` one after the other and fitted for `iterations` from these values.
+pub fn assemble<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    own: &Values,
+    parts: &[Part],
+    iterations: usize,
+) -> Option<Hypothesis<'d>> {
+    let mut document = none.base.document();
+    let mut values = own.clone();
+    let mut effects = Vec::new();
+    for part in parts {
+        let (written, slot) = rewrite_at(&none.base, &document, &setting.original, part.mechanism, &part.slot)?;
+        values = with_added_starts(&values, &written, &slot, setting.data.stretches.len());
+        for (name, x) in written.parameters_of().iter().zip(&part.values) {
+            if let (Some(x), Some(p)) = (x, written.simulation.parameter(name)) {
+                values.parameters.insert(name.clone(), x.clamp(p.lower(), p.upper()));
+            }
+        }
+        document = written.simulation.clone();
+        effects.push(Effect { mechanism: part.mechanism, slot, written, concealment: part.concealment });
+    }
+    let base = setting.fit(&document, &values, Some(&none.base.whitener), 1, iterations)?;
+    let log_evidence = setting.evidence(&base);
+    Some(Hypothesis { effects, base, log_evidence })
+}
+
+/// Goes on with a hypothesis that was fitted for a few iterations only.
+pub fn complete<'d>(setting: &Setting<'d>, mut h: Hypothesis<'d>) -> Hypothesis<'d> {
+    let document = h.base.model.simulation();
+    if let Some(base) = setting.fit(document, &h.base.values(), Some(&h.base.whitener), 2, setting.iterations)
+        && base.log_likelihood > h.base.log_likelihood
+    {
+        h.base = base;
+    }
+    finish(setting, &mut h, 0);
+    h
+}
+
+/// The set without its `index`-th effect: the others are written anew in their order and fitted from where they were.
+pub fn without<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    set: &Hypothesis<'d>,
+    index: usize,
+) -> Option<Hypothesis<'d>> {
+    let values = set.base.values();
+    let rest: Vec<Part> = (set.effects.iter().enumerate())
+        .filter(|(i, _)| *i != index)
+        .map(|(_, e)| Part::of_effect(e, &values))
+        .collect();
+    if rest.is_empty() {
+        return None;
+    }
+    assemble(setting, none, &values, &rest, setting.iterations).map(|h| complete(setting, h))
+}

@@ -1,0 +1,110 @@
+//! A hypothesis: a set of effects, written into the user's simulation and fitted together with its parameters.
+//!
+//! Its evidence is the log likelihood of the residual under its own noise model, less half of `ln n` for each unknown that the effects
+//! brought (the Bayes criterion).
+
+use hysid_plant::Simulation;
+
+use crate::base::{Base, NoiseKind, fit_simulation};
+use crate::data::{DataSet, held_out_blocks};
+use crate::evidence::Whitener;
+use crate::mechanism::{Mechanism, Rewritten};
+use crate::model::{Model, Values};
+use crate::refit::{LmOptions, levenberg_marquardt};
+use crate::slot::Slot;
+
+/// An effect of a hypothesis.
+#[derive(Debug, Clone)]
+pub struct Effect {
+    /// The mechanism.
+    pub mechanism: &'static Mechanism,
+    /// The slot at which it was written.
+    pub slot: Slot,
+    /// How it was written: names of its parameters and states, what is reported.
+    pub written: Rewritten,
+    /// Share that the simulation's own parameters absorb, from the screening.
+    pub concealment: Option<f64>,
+}
+
+/// A fitted set of effects.
+#[derive(Debug)]
+pub struct Hypothesis<'d> {
+    /// The effects in the order in which they were written.
+    pub effects: Vec<Effect>,
+    /// The fitted simulation.
+    pub base: Base<'d>,
+    /// Log likelihood less the price of what the effects brought.
+    pub log_evidence: f64,
+}
+
+/// Names of a set, sorted: two hypotheses with the same key are the same statement.
+pub type Key = Vec<(&'static str, String)>;
+
+impl Hypothesis<'_> {
+    /// The statement that it makes.
+    pub fn key(&self) -> Key {
+        let mut key: Key = self.effects.iter().map(|e| (e.mechanism.id, e.slot.label.clone())).collect();
+        key.sort();
+        key
+    }
+}
+
+/// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest: log likelihood of the blocks, and the
+/// sum of squares of each block's rows for the standard error of a difference.
+pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Vec<f64>)> {
+    let data = setting.data;
+    let weights = held_out_blocks(&data.layout, &data.y);
+    let options = LmOptions { iterations: 5, ..LmOptions::default() };
+    let fit =
+        levenberg_marquardt(&h.base.model, &h.base.fit.theta, &data.layout, &h.base.whitener, Some(&weights), options)?;
+    let white = h.base.whitener.apply(&data.layout, &fit.residual);
+    let (mut score, mut squares) = (0.0, Vec::new());
+    for s in &data.layout.series {
+        let scale = h.base.whitener.models[s.output].log_scale(s.rows.len()) / s.rows.len() as f64;
+        for row in s.rows.clone().filter(|&row| weights[row] == 0.0) {
+            score -= 0.5 * white[row] * white[row] + scale;
+            squares.push(fit.residual[row] * fit.residual[row]);
+        }
+    }
+    (!squares.is_empty()).then_some((score, squares))
+}
+
+/// What all fits share.
+#[derive(Debug, Clone)]
+pub struct Setting<'d> {
+    /// The estimation data.
+    pub data: &'d DataSet,
+    /// The user's simulation.
+    pub original: Simulation,
+    /// Names of its states.
+    pub own_states: Vec<String>,
+    /// Integration steps in each period.
+    pub substeps: usize,
+    /// Number of unknowns of the simulation without effects.
+    pub own_unknowns: usize,
+    /// Iterations of a refit on the short list.
+    pub iterations: usize,
+    /// How noise is modelled.
+    pub noise: NoiseKind,
+}
+
+impl<'d> Setting<'d> {
+    /// Fits a document from values; the noise model is that given, then its own.
+    pub fn fit(
+        &self,
+        document: &Simulation,
+        start: &Values,
+        noise: Option<&Whitener>,
+        rounds: usize,
+        iterations: usize,
+    ) -> Option<Base<'d>> {
+        let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
+        fit_simulation(model, start, noise, rounds, LmOptions { iterations, ..LmOptions::default() }, self.noise)
+    }
+
+    /// The evidence of a fitted document.
+    pub fn evidence(&self, base: &Base<'_>) -> f64 {
+        let brought = base.model.unknowns().len().saturating_sub(self.own_unknowns) as f64;
+        base.log_likelihood - 0.5 * brought * (self.noise.share() * self.data.rows() as f64).max(2.0).ln()
+    }
+}
