@@ -5,9 +5,15 @@
 //! that survive it (an offset, a trend, a periodic excitation); blocks of random sign do. Multiplicity over effects and shapes is inside the
 //! maximum, so the p-value needs no correction.
 //!
+//! What is left of low-frequency noise after prewhitening is scattered by the signs, and a handful of its lines can look like a slow effect.
+//! So a mismatch must also stand out from noise that is drawn with the residual's own spectrum, smoothed by a running median: a few lines that
+//! tower over their neighbours (an offset, a periodic effect) do not raise the median, noise that rises towards low frequency does.
+//!
 //! The features must come from *simulated* trajectories: measured ones carry the noise of the residual into the feature.
 
+use hysid_signal::{fourier, inverse_fourier};
 use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::layout::Layout;
@@ -89,9 +95,44 @@ fn surrogate(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> V
     out
 }
 
+/// The level of each line of a series' spectrum: the median of its neighbours, as wide as a third of the frequency, at least nine lines.
+fn levels(x: &[f64]) -> Vec<f64> {
+    let power: Vec<f64> = fourier(x).iter().map(|(re, im)| re * re + im * im).collect();
+    let last = power.len().saturating_sub(1);
+    (0..power.len())
+        .map(|k| {
+            let half = (k / 3).max(4);
+            // The mean is a line of its own kind.
+            let window = k.saturating_sub(half).max(1)..=(k + half).min(last);
+            let mut near: Vec<f64> = power.get(window).unwrap_or_default().to_vec();
+            near.sort_by(f64::total_cmp);
+            // The median of an exponential law is ln 2 of its mean.
+            near.get(near.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
+        })
+        .collect()
+}
+
+/// Gaussian noise with these levels, for each series of the layout.
+fn drawn(layout: &Layout, levels: &[Vec<f64>], rows: usize, seed: u64, index: u64) -> Vec<f64> {
+    let mut rng = generator(seed, 0x6u64 << 56 | index);
+    let mut out = vec![0.0; rows];
+    for (s, levels) in layout.series.iter().zip(levels) {
+        let lines: Vec<(f64, f64)> = levels
+            .iter()
+            .map(|l| {
+                let mut part = || (0.5 * l).sqrt() * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+                (part(), part())
+            })
+            .collect();
+        out[s.rows.clone()].copy_from_slice(&inverse_fourier(&lines, s.rows.len()));
+    }
+    out
+}
+
 /// Tests whether the whitened residual `r`, already projected off `own`, is related to any of the groups.
 ///
-/// Surrogates are drawn in batches: a clear answer ends after 199, a close one goes on to `4/alpha` (at least 999).
+/// Surrogates are drawn in batches: a clear answer ends after 199, a close one goes on to `4/alpha` (at least 999). The p-value is the
+/// larger one of the two kinds of surrogate; the second kind is drawn only where the first is exceeded.
 pub fn surrogate_test(
     groups: &[&FeatureGroup],
     layout: &Layout,
@@ -100,39 +141,59 @@ pub fn surrogate_test(
     options: TestOptions,
 ) -> SurrogateTest {
     let (statistic, best) = largest(groups, r, own);
+    if groups.is_empty() {
+        return SurrogateTest { p_value: 1.0, statistic: 0.0, best: None, surrogates: Vec::new() };
+    }
     let tau = correlation_time(layout, r);
-    let alpha = options.alpha.clamp(1e-5, 0.5);
+    let score_of = |x: &[f64]| largest(groups, x, own).0;
+    let rolled = |b: u64| score_of(&surrogate(layout, r, tau, options.seed, b));
+    let mut surrogates = draw(&rolled, statistic, options.alpha);
+    let mut p_value = exceeded(&surrogates, statistic);
+    if p_value < options.alpha {
+        let levels: Vec<Vec<f64>> = layout.series.iter().map(|s| levels(&r[s.rows.clone()])).collect();
+        let gaussian = |b: u64| {
+            let mut x = drawn(layout, &levels, r.len(), options.seed, b);
+            own.remove(&mut x);
+            score_of(&x)
+        };
+        let other = draw(&gaussian, statistic, options.alpha);
+        let p = exceeded(&other, statistic);
+        if p > p_value {
+            (p_value, surrogates) = (p, other);
+        }
+    }
+    SurrogateTest { p_value, statistic, best, surrogates }
+}
+
+/// `(1 + scores at least as large) / (1 + scores)`.
+fn exceeded(scores: &[f64], statistic: f64) -> f64 {
+    (1 + scores.iter().filter(|&&v| v >= statistic).count()) as f64 / (1 + scores.len()) as f64
+}
+
+/// Scores of surrogates, in batches until the answer is clear.
+fn draw(one: &(dyn Fn(u64) -> f64 + Sync), statistic: f64, alpha: f64) -> Vec<f64> {
+    let alpha = alpha.clamp(1e-5, 0.5);
     let first = ((1.0 / alpha).ceil() as usize).max(200) - 1;
     let most = ((4.0 / alpha).ceil() as usize).max(1000) - 1;
-    let mut surrogates: Vec<f64> = Vec::new();
-    if groups.is_empty() {
-        return SurrogateTest { p_value: 1.0, statistic: 0.0, best: None, surrogates };
-    }
-    let p = |s: &[f64]| (1 + s.iter().filter(|&&v| v >= statistic).count()) as f64 / (1 + s.len()) as f64;
-    while surrogates.len() < most {
-        let start = surrogates.len();
+    let mut scores: Vec<f64> = Vec::new();
+    while scores.len() < most {
+        let start = scores.len();
         let end = if start == 0 { first } else { (start + 200).min(most) };
-        let batch: Vec<f64> = (start..end)
-            .into_par_iter()
-            .map(|b| largest(groups, &surrogate(layout, r, tau, options.seed, b as u64), own).0)
-            .collect();
-        surrogates.extend(batch);
-        let exceeding = surrogates.iter().filter(|&&v| v >= statistic).count();
-        let highest = surrogates.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if exceeding >= 20
-            || (exceeding == 0 && statistic > highest + 6.0 && 1.0 / (1 + surrogates.len()) as f64 <= alpha)
+        scores.extend((start..end).into_par_iter().map(|b| one(b as u64)).collect::<Vec<f64>>());
+        let exceeding = scores.iter().filter(|&&v| v >= statistic).count();
+        let highest = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if exceeding >= 20 || (exceeding == 0 && statistic > highest + 6.0 && 1.0 / (1 + scores.len()) as f64 <= alpha)
         {
             break;
         }
     }
-    SurrogateTest { p_value: p(&surrogates), statistic, best, surrogates }
+    scores
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::evidence::{Series, Whitener};
-    use rand_distr::{Distribution, StandardNormal};
 
     const N: usize = 1000;
 
