@@ -160,7 +160,8 @@ fn answer(
     options: Options,
     hooks: &Hooks<'_>,
 ) -> Result<Diagnosis, Failure> {
-    let request = Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, questions, options };
+    let request =
+        Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, questions, options };
     let mut outcome = diagnose(&request, hooks).map_err(|e| refused(&e, &request))?;
     if !(hooks.expired)() {
         (hooks.progress)("identifying a black box for comparison");
