@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::fitting::{Part, assemble, complete, refit_all, without};
-use crate::hypothesis::{Hypothesis, Setting};
+use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::joint::pairs;
 use crate::screen::{Candidate, screen};
 
@@ -88,7 +88,7 @@ pub fn compose<'d>(
     pool: &mut Vec<Hypothesis<'d>>,
     options: SearchOptions,
     unexplained: &dyn Fn(&Hypothesis<'d>) -> bool,
-    enough: &(dyn Fn() -> bool + Sync),
+    enough: &dyn Fn() -> bool,
 ) {
     for depth in 2..=options.depth {
         if enough() {
@@ -108,7 +108,7 @@ pub fn compose<'d>(
             if enough() {
                 break;
             }
-            found.extend(extended(setting, &pool[p], options));
+            found.extend(extended(setting, &pool[p], options, None));
         }
         let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
         for h in found {
@@ -132,7 +132,7 @@ pub fn compose<'d>(
                 break;
             }
             let Some(rest) = without(setting, none, &pool[best], index) else { continue };
-            found.extend(extended(setting, &rest, options));
+            found.extend(extended(setting, &rest, options, Some(&pool[best].effects[index])));
             found.push(rest);
         }
         for h in found {
@@ -144,13 +144,25 @@ pub fn compose<'d>(
     }
 }
 
-/// A set with one more effect, for the likeliest of what could be missing around it.
-fn extended<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, options: SearchOptions) -> Vec<Hypothesis<'d>> {
+/// A set with one more effect, for the likeliest of what could be missing around it, and for the family of the effect that was taken out.
+fn extended<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'d>,
+    options: SearchOptions,
+    dropped: Option<&Effect>,
+) -> Vec<Hypothesis<'d>> {
     let candidates = screen(&parent.base, &setting.original, &parent.base.evidence(), &|_, _| true);
     if candidates.first().is_none_or(|c| c.score() < 2.0) {
         return Vec::new();
     }
-    refit_all(setting, parent, &short_list(&candidates, options.most))
+    let mut list = short_list(&candidates, options.most);
+    let sibling = |c: &&Candidate| {
+        dropped.is_some_and(|d| d.mechanism.family == c.mechanism.family && d.slot.label == c.slot.label)
+            && !list.iter().any(|l| std::ptr::eq(*l, *c))
+    };
+    let more: Vec<&Candidate> = candidates.iter().filter(sibling).collect();
+    list.extend(more);
+    refit_all(setting, parent, &list)
 }
 
 /// Adds a hypothesis, or replaces the same statement with less evidence.

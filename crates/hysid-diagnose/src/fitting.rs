@@ -223,6 +223,8 @@ fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usiz
     }
 }
 
+/// Candidates of a list that are fitted to the end.
+const MOST_COMPLETE: usize = 8;
 /// Log evidence by which a candidate may trail after a few iterations and still be refitted to the end.
 const HOPELESS: f64 = 40.0;
 
@@ -235,7 +237,8 @@ pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Ca
     order.sort_by(|a, b| b.total_cmp(a));
     let best = order.first().copied().unwrap_or(f64::NEG_INFINITY);
     let fourth = order.get(3).copied().unwrap_or(f64::NEG_INFINITY);
-    let threshold = (best - HOPELESS).min(fourth);
+    let last = order.get(MOST_COMPLETE - 1).copied().unwrap_or(f64::NEG_INFINITY);
+    let threshold = (best - HOPELESS).min(fourth).max(last);
     let mut out: Vec<Hypothesis<'d>> = list
         .par_iter()
         .zip(first)

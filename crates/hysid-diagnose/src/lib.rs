@@ -42,4 +42,4 @@ pub use data::{DataSet, Stretch, held_out_blocks};
 pub use error::DiagnoseError;
 pub use model::{Model, Outputs, Unknown, Values};
 
-pub use pipeline::{Diagnosis, Hooks, Options, Question, Request, diagnose};
+pub use pipeline::{COMPOSING, Diagnosis, Hooks, Options, Question, Request, diagnose};

@@ -62,8 +62,8 @@ pub struct Request<'a> {
 pub struct Hooks<'a> {
     /// Told at the start of each step.
     pub progress: &'a (dyn Fn(&str) + Sync),
-    /// Whether time is up: optional steps are then left out.
-    pub expired: &'a (dyn Fn() -> bool + Sync),
+    /// Whether this share of the time is up: optional steps are then left out.
+    pub expired: &'a (dyn Fn(f64) -> bool + Sync),
 }
 
 /// The outcome of a diagnosis.
@@ -83,6 +83,9 @@ pub struct Diagnosis {
 const MOST_SAMPLES: usize = 26_000;
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
+/// Share of the time after which no further effects are looked for: what was found must still be judged.
+pub const COMPOSING: f64 = 0.6;
+
 /// Diagnoses a simulation.
 ///
 /// # Errors
@@ -171,7 +174,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let plainly = Search::new(&plain, options, hooks);
     let mut gross = if none.base.gross() || is_far(&none.base) { plainly.start(&none) } else { None };
     if let (Some((start, found)), true) = (&gross, test.p_value >= options.alpha)
-        && !(hooks.expired)()
+        && !(hooks.expired)(COMPOSING)
         && let Some(p) = plainly.second_look(start, found)
     {
         file.notes.push(format!("surrogates of the residual do not tell the mismatch from chance (p = {:.3}): nearly all of it is the effect itself; blocks held out of the fit do (p = {p:.1e})", test.p_value));
@@ -275,9 +278,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             e.probability = e.probability.min(NOT_FIRM);
             e.family_probability = e.family_probability.min(NOT_FIRM);
         }
-        file.notes.push("the best set of effects predicts held-out blocks of the recordings worse than the simulation as it is: it is no improvement outside the data it was fitted to, and no augmented simulation is written".into());
+        file.notes.push("the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to, and no augmented simulation is written".into());
     }
-    if significant && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous) && !(hooks.expired)() {
+    if significant && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous) && !(hooks.expired)(1.0) {
         (hooks.progress)("looking for an experiment");
         file.experiment = rival_of(&pool, &weighed, winner).and_then(|rival| {
             let present = present_separation(setting, best, &pool[rival]);
@@ -301,7 +304,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             (left(&best.base.fit.residual) / left(&pool[0].base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
         let share = if share.is_finite() { share } else { 0.0 };
         file.remaining = Some(RemainingRecord { p_value: remaining.p_value, share });
-        if remaining.p_value < options.alpha && !(hooks.expired)() {
+        if remaining.p_value < options.alpha {
             (hooks.progress)("modelling what remains");
             if let Some(open) = correction(&best.base)
                 && open.block_ratio < BETTER
@@ -313,7 +316,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
                 file.correction = Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record });
             }
         }
-    } else if significant && let Some(open) = correction(&best.base) {
+    } else if significant
+        && let Some(open) = correction(&best.base)
+        && open.block_ratio < BETTER
+    {
         file.verdict = VerdictKind::NotInCatalogue;
         file.correction = Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record });
     }

@@ -13,7 +13,7 @@ use crate::fitting::{refit, refit_all};
 use crate::hypothesis::{Hypothesis, Key, Setting, block_score};
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
-use crate::pipeline::{Hooks, Options, Question, Request};
+use crate::pipeline::{COMPOSING, Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
 
@@ -111,7 +111,8 @@ impl<'a, 'd> Search<'a, 'd> {
             test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured()
         };
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
-        compose(self.setting, none, candidates, pool, bounds, &unexplained, self.hooks.expired);
+        let enough = || (self.hooks.expired)(COMPOSING);
+        compose(self.setting, none, candidates, pool, bounds, &unexplained, &enough);
     }
 
     /// The likeliest of these sets, which were found under another noise model, fitted under this search's.

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use hysid_diagnose::file::VerdictKind;
-use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
+use hysid_diagnose::{COMPOSING, DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 
 use self::folder::Folder;
@@ -83,7 +83,7 @@ fn work(args: &Args) -> Result<(), Failure> {
     let options = Options { alpha: args.alpha, seed: args.seed };
     let questions = args.consider.iter().map(|text| question(text)).collect::<Result<Vec<_>, _>>()?;
     let progress = |step: &str| eprintln!("hysid: {step} ...");
-    let expired = || args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > limit);
+    let expired = |share: f64| args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > share * limit);
     let hooks = Hooks { progress: &progress, expired: &expired };
     let files = Files { estimation: &args.recording, holdout: &args.holdout };
     let (mut outcome, folder) = match (&args.simulation, &args.simulated) {
@@ -116,10 +116,10 @@ fn work(args: &Args) -> Result<(), Failure> {
             return Err(Failure::BadInput("give a simulation file, or --simulated with --input and --output".into()));
         }
     };
-    if let Some(limit) = args.time_limit.filter(|_| expired()) {
+    if let Some(limit) = args.time_limit.filter(|_| expired(COMPOSING)) {
         outcome.file.notes.push(format!(
-            "the time limit of {limit} s was reached: steps that refine the verdict (further effects, held-out blocks, an experiment, a correction, a black box) \
-             were left out, and the result depends on the machine"
+            "the time limit of {limit} s was nearly or wholly used up: steps that refine the verdict (further effects, held-out blocks, an experiment, a black box) \
+             may have been left out, and the result depends on the machine"
         ));
     }
 
@@ -163,7 +163,7 @@ fn answer(
     let request =
         Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, questions, options };
     let mut outcome = diagnose(&request, hooks).map_err(|e| refused(&e, &request))?;
-    if !(hooks.expired)() {
+    if !(hooks.expired)(1.0) {
         (hooks.progress)("identifying a black box for comparison");
         black_box::score(&mut outcome.file, &outcome.picture, simulation, intake, options.seed);
     }
