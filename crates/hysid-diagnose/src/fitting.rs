@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use crate::base::Base;
+use crate::calibrate::calibrated_copy;
 use crate::evidence::norm2;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::Mechanism;
@@ -57,21 +58,22 @@ pub fn is_far(base: &Base<'_>) -> bool {
     norm2(&base.fit.residual) > FAR * FAR * power
 }
 
-/// A few iterations from a candidate's best start; from the user's own parameters too where the fit without the effect is far off.
+/// A few iterations from a candidate's best start; from the user's own parameters and from a global calibration too where the fit without
+/// the effect is far off.
 fn sketch<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
     let froms = starting_values(setting, parent, candidate);
-    let own = if is_far(&parent.base) { froms.last().filter(|_| froms.len() > 1) } else { None };
     let base = froms
-        .first()
-        .into_iter()
-        .chain(own)
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| *i == 0 || (*i + 2 >= froms.len() && is_far(&parent.base)))
+        .map(|(_, from)| from)
         .filter_map(|from| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, 3))
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
     Some(hypothesis(setting, parent, candidate, base))
 }
 
 /// The parent's values with each of the candidate's starts; the last one has the simulation's parameters as the user gave them where the
-/// parent has no effect yet.
+/// parent has no effect yet, and the one before it comes from a global calibration where the parent is far off.
 fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
     let document = &candidate.refit.simulation;
     let values =
@@ -94,7 +96,19 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
         for p in setting.original.parameters.iter().filter(|p| !p.fixed) {
             own.parameters.insert(p.name.clone(), p.value);
         }
-        out.push(with(&own, best));
+        let own = with(&own, best);
+        if is_far(&parent.base) {
+            let mut document = document.clone();
+            for p in &mut document.parameters {
+                p.value = own.parameters.get(&p.name).copied().unwrap_or(p.value);
+            }
+            if let Some((found, _)) = calibrated_copy(&document, setting.data, 1) {
+                let mut global = own.clone();
+                global.parameters.extend(found.parameters.iter().map(|p| (p.name.clone(), p.value)));
+                out.push(global);
+            }
+        }
+        out.push(own);
     }
     out
 }

@@ -228,6 +228,15 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if (imperfect && claims.len() > 1) || claims.len() > 2 {
         support.iter_mut().for_each(Support::weaken);
     }
+    for (e, s) in pool[winner].effects.iter().zip(&mut support) {
+        if bounded(&pool[winner].base, e) || e.mechanism.family.members_imitate() {
+            s.mechanism = s.mechanism.min(NOT_FIRM);
+        }
+    }
+    // What is still far from the recording is not understood, whatever was gained.
+    if is_far(&pool[winner].base) {
+        support.iter_mut().for_each(Support::weaken);
+    }
     // Two members of one family in one set: something of that kind, but neither of them as it stands.
     for i in 0..claims.len() {
         if claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family) {

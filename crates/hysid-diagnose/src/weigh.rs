@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use crate::base::Base;
 use crate::compose::best_of;
-use crate::hypothesis::{Hypothesis, Setting, block_score};
+use crate::hypothesis::{Effect, Hypothesis, Setting, block_score};
 use crate::mechanism::Mechanism;
 use crate::slot::Slot;
 use crate::verdict::{Claim, Hypothesis as Weighed};
@@ -102,6 +103,12 @@ pub fn better_by_chance(before: &[f64], after: &[f64]) -> Option<f64> {
     let count = before.chunks(20).count() as f64;
     let law = statrs::distribution::StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
     Some(1.0 - statrs::distribution::ContinuousCDF::cdf(&law, t))
+}
+
+/// Whether a parameter of the effect stands at a bound: the law is stretched to what it was not made for, a sibling may be meant.
+pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
+    let places = effect.written.parameters_of();
+    places.iter().filter_map(|n| base.model.place_of(n)).any(|place| base.fit.at_bound[place])
 }
 
 /// Whether two sets say the same of families and slots and differ in members only.
