@@ -105,3 +105,11 @@ named! {
         Disturbance = "disturbance",
     }
 }
+
+impl Family {
+    /// Whether its members are sums of a few elements that imitate each other: which of them it is turns on how finely each law is
+    /// written, and is never said firmly.
+    pub fn members_imitate(self) -> bool {
+        self == Self::ActuatorHysteresis
+    }
+}
