@@ -54,11 +54,11 @@ const PAIRS: (usize, usize) = (10, 4);
 const ROUNDS: usize = 2;
 
 /// Pairs of candidates of the simulation without effects, fitted together.
-fn superposed<'d>(
+pub fn superposed<'d>(
     setting: &Setting<'d>,
     none: &Hypothesis<'d>,
     candidates: &[Candidate],
-    options: SearchOptions,
+    most: usize,
 ) -> Vec<Hypothesis<'d>> {
     let (_, r) = none.base.evidence();
     let own = none.base.values();
@@ -71,7 +71,7 @@ fn superposed<'d>(
         })
         .collect();
     sketched.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    let rest = sketched.split_off(PAIRS.1.min(sketched.len()).min(options.most));
+    let rest = sketched.split_off(PAIRS.1.min(sketched.len()).min(most));
     let mut out: Vec<Hypothesis<'d>> = sketched.into_par_iter().map(|h| complete(setting, h)).collect();
     out.extend(rest);
     out
@@ -102,7 +102,7 @@ pub fn compose<'d>(
         let parents = beam(pool, depth - 1, options.beam);
         let mut found = Vec::new();
         if depth == 2 {
-            found.extend(superposed(setting, none, candidates, options));
+            found.extend(superposed(setting, none, candidates, options.most));
         }
         for p in parents {
             if enough() {

@@ -180,6 +180,15 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         file.notes.push(format!("surrogates of the residual do not tell the mismatch from chance (p = {:.3}): nearly all of it is the effect itself; blocks held out of the fit do (p = {p:.1e})", test.p_value));
         file.mismatch.p_value = finite(p);
     }
+    if gross.is_none()
+        && test.p_value >= options.alpha
+        && none.base.coloured()
+        && !(hooks.expired)(COMPOSING)
+        && let Some(p) = search.second_look(&none, &candidates)
+    {
+        file.notes.push(format!("surrogates of the residual do not tell the mismatch from coloured noise (p = {:.3}); effects that were fitted predict blocks held out of the fit better (p = {p:.1e})", test.p_value));
+        file.mismatch.p_value = finite(p);
+    }
     let significant = file.mismatch.p_value.is_some_and(|p| p < options.alpha);
     let mut pool = Vec::new();
     if significant && let Some((start, found)) = gross.take() {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::base::Base;
-use crate::compose::{SearchOptions, add, compose, short_list};
+use crate::compose::{SearchOptions, add, compose, short_list, superposed};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all};
@@ -178,24 +178,31 @@ impl<'a, 'd> Search<'a, 'd> {
         surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, options)
     }
 
-    /// A second look where the surrogates see nothing: they are made of the residual itself, and where nearly all of it is the effect
-    /// they carry the effect's shape. The likeliest effects are refitted; one that takes [`LARGE`] of the residual's power and predicts
-    /// blocks that it was not fitted to better is no accident.
+    /// A second look where the surrogates see nothing: they are made of the residual itself, and where much of it is mismatch they carry its
+    /// shape; and two effects that cancel each other show in no single score. The likeliest effects and pairs are fitted; a set that takes
+    /// [`LARGE`] of the residual's power or brings [`SURE`] of log evidence, and predicts blocks that it was not fitted to better, is no
+    /// accident.
     ///
-    /// Returns the p-value of the difference on the blocks, corrected for the number of effects tried.
+    /// Returns the p-value of the difference on the blocks, corrected for the number of sets tried.
     pub fn second_look(&self, none: &Hypothesis<'d>, candidates: &[Candidate]) -> Option<f64> {
-        let list = short_list(candidates, 5);
-        let fitted = refit_all(self.setting, none, &list);
-        let rows = self.setting.data.rows() as f64;
-        let least = -0.5 * self.setting.noise.share() * rows * (1.0 - LARGE).ln();
-        let best = fitted.first().filter(|h| h.base.log_likelihood > none.base.log_likelihood + least)?;
+        let mut fitted = refit_all(self.setting, none, &short_list(candidates, 5));
+        fitted.extend(superposed(self.setting, none, candidates, 4));
+        let tried = fitted.len() as f64;
+        let best = fitted.into_iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let rows = self.setting.noise.share() * self.setting.data.rows() as f64;
+        let large = best.base.log_likelihood - none.base.log_likelihood > -0.5 * rows * (1.0 - LARGE).ln();
+        if !large && best.log_evidence - none.log_evidence < SURE {
+            return None;
+        }
         let (_, before) = block_score(self.setting, none)?;
-        let (_, after) = block_score(self.setting, best)?;
-        let p = crate::weigh::better_by_chance(&before, &after)? * list.len() as f64;
+        let (_, after) = block_score(self.setting, &best)?;
+        let p = crate::weigh::better_by_chance(&before, &after)? * tried;
         (p < self.options.alpha).then_some(p)
     }
 }
 
+/// Log evidence that speaks for a set without the surrogates.
+const SURE: f64 = 15.0;
 /// A question as it was typed.
 pub fn words(question: &Question) -> String {
     question.iter().map(|(m, s)| format!("{m}@{s}")).collect::<Vec<_>>().join("+")
