@@ -181,9 +181,9 @@ impl<'a, 'd> Search<'a, 'd> {
     /// A second look where the surrogates see nothing: they are made of the residual itself, and where much of it is mismatch they carry its
     /// shape; and two effects that cancel each other show in no single score. The likeliest effects and pairs are fitted; a set that takes
     /// [`LARGE`] of the residual's power or brings [`SURE`] of log evidence, and predicts blocks that it was not fitted to better, is no
-    /// accident.
+    /// accident. Nor is one that leaves [`HALF`] of the squared error on such blocks, however few they are.
     ///
-    /// Returns the p-value of the difference on the blocks, corrected for the number of sets tried.
+    /// Returns the p-value of the difference on the blocks, corrected for the number of sets tried, where there is a mismatch.
     pub fn second_look(&self, none: &Hypothesis<'d>, candidates: &[Candidate]) -> Option<f64> {
         let mut fitted = refit_all(self.setting, none, &short_list(candidates, 5));
         fitted.extend(superposed(self.setting, none, candidates, 4));
@@ -196,11 +196,14 @@ impl<'a, 'd> Search<'a, 'd> {
         }
         let (_, before) = block_score(self.setting, none)?;
         let (_, after) = block_score(self.setting, &best)?;
-        let p = crate::weigh::better_by_chance(&before, &after)? * tried;
-        (p < self.options.alpha).then_some(p)
+        let p = (crate::weigh::better_by_chance(&before, &after)? * tried).min(1.0);
+        let halved = after.iter().sum::<f64>() < HALF * before.iter().sum::<f64>();
+        (p < self.options.alpha || halved).then_some(p)
     }
 }
 
+/// Share of the squared error on held-out blocks that noise never takes away.
+const HALF: f64 = 0.5;
 /// Log evidence that speaks for a set without the surrogates.
 const SURE: f64 = 15.0;
 /// A question as it was typed.
