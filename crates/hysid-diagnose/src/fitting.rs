@@ -73,7 +73,7 @@ fn sketch<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candid
 }
 
 /// The parent's values with each of the candidate's starts; the last one has the simulation's parameters as the user gave them where the
-/// parent has no effect yet, and the one before it comes from a global calibration where the parent is far off.
+/// parent has no effect yet, and the one before it comes from a global calibration where the parent is far off and the law has no amplitude.
 fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
     let document = &candidate.refit.simulation;
     let values =
@@ -97,7 +97,8 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
             own.parameters.insert(p.name.clone(), p.value);
         }
         let own = with(&own, best);
-        if is_far(&parent.base) {
+        // A law with amplitudes begins beside the simulation as it is; one without them is there or not, and may stand far from it.
+        if candidate.refit.amplitudes.is_empty() && is_far(&parent.base) {
             let mut document = document.clone();
             for p in &mut document.parameters {
                 p.value = own.parameters.get(&p.name).copied().unwrap_or(p.value);
