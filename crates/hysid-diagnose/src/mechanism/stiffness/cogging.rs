@@ -18,10 +18,12 @@ pub static COGGING: Mechanism = Mechanism {
             .amplitude("A_c", "F", -1.0, 1.0)
             .silent()
             .shape("p_x", "x", Grid::Reach("x", log_steps(0.05, 1.0, 40)))
+            // Three standard deviations are about the whole travel: a longer period is a curved spring and no ripple.
+            .within(0.005, 3.0)
             .report("A", "F", "sqrt(A_s^2 + A_c^2)")
             .report("phi", "1", "atan2(A_c, A_s)")
     },
-    contains: &[],
+    contains: &["gravity"],
     confusable: &["stribeck_friction", "cubic_stiffness"],
     needs: &[Need::Slow("v")],
     sentence: "A force of {A} repeats every {p_x} of travel {place}; the simulation has none.",
