@@ -82,6 +82,8 @@ pub fn log_likelihood(data: &DataSet, noise: &Whitener, residual: &[f64]) -> f64
 
 /// A noise whose innovations are a smaller share of it than this is no noise: something moves the output slowly and smoothly.
 const GROSS: f64 = 0.1;
+/// Share of the output that a residual has where the simulation's parameters say little.
+const FAR: f64 = 0.3;
 /// Innovations of white noise are the noise; below this share something is left that a further effect may explain.
 const COLOURED: f64 = 0.85;
 
@@ -94,6 +96,14 @@ impl Base<'_> {
     /// Whether the residual is mismatch throughout: its own past predicts it too well for noise.
     pub fn gross(&self) -> bool {
         self.whitener.models.iter().any(|m| m.innovation() < GROSS * m.noise_rms())
+    }
+
+    /// Whether the simulation is so far from the recording that its parameters say little.
+    pub fn far(&self) -> bool {
+        let data = self.model.data();
+        let mean = data.y.iter().sum::<f64>() / data.rows().max(1) as f64;
+        let power: f64 = data.y.iter().map(|y| (y - mean).powi(2)).sum();
+        norm2(&self.fit.residual) > FAR * FAR * power
     }
 
     /// The document with the fitted values.
@@ -117,11 +127,8 @@ impl Base<'_> {
 
     /// 95 % intervals of the parameters (not of initial values): name, value, low, high, whether at a bound.
     pub fn intervals(&self) -> Vec<(String, f64, f64, f64, bool)> {
-        let data = self.model.data();
         let k = self.fit.theta.len();
-        let white = self.whitener.apply(&data.layout, &self.fit.residual);
-        let variance = norm2(&white) / (data.rows().saturating_sub(k)).max(1) as f64;
-        let covariance = self.fit.covariance(&data.layout, &self.whitener, None, variance);
+        let covariance = self.covariance();
         let bounds = self.model.bounds();
         (0..k)
             .filter_map(|i| {

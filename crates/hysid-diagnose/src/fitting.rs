@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use crate::base::Base;
 use crate::calibrate::calibrated_copy;
-use crate::evidence::norm2;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::Mechanism;
 use crate::model::Values;
@@ -47,29 +46,20 @@ fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
     out
 }
 
-/// Share of the output that a residual has where the simulation's fit without the effect says little of its parameters.
-const FAR: f64 = 0.3;
-
-/// Whether a simulation is so far from the recording that its parameters say little.
-pub fn is_far(base: &Base<'_>) -> bool {
-    let data = base.model.data();
-    let mean = data.y.iter().sum::<f64>() / data.rows().max(1) as f64;
-    let power: f64 = data.y.iter().map(|y| (y - mean).powi(2)).sum();
-    norm2(&base.fit.residual) > FAR * FAR * power
-}
-
-/// A few iterations from a candidate's best start; from the user's own parameters and from a global calibration too where the fit without
-/// the effect is far off.
-fn sketch<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
-    let froms = starting_values(setting, parent, candidate);
-    let base = froms
+/// A few iterations from a candidate's best start, the first of `froms`; from the last two as well (the user's own parameters and a global
+/// calibration) where the fit without the effect is far off.
+fn sketch<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    froms: &[Values],
+) -> Option<Base<'d>> {
+    froms
         .iter()
         .enumerate()
-        .filter(|(i, _)| *i == 0 || (*i + 2 >= froms.len() && is_far(&parent.base)))
-        .map(|(_, from)| from)
-        .filter_map(|from| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, 3))
-        .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
-    Some(hypothesis(setting, parent, candidate, base))
+        .filter(|(i, _)| *i == 0 || (*i + 2 >= froms.len() && parent.base.far()))
+        .filter_map(|(_, from)| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, 3))
+        .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
 /// The parent's values with each of the candidate's starts; the last one has the simulation's parameters as the user gave them where the
@@ -98,7 +88,7 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
         }
         let own = with(&own, best);
         // A law with amplitudes begins beside the simulation as it is; one without them is there or not, and may stand far from it.
-        if candidate.refit.amplitudes.is_empty() && is_far(&parent.base) {
+        if candidate.refit.amplitudes.is_empty() && parent.base.far() {
             let mut document = document.clone();
             for p in &mut document.parameters {
                 p.value = own.parameters.get(&p.name).copied().unwrap_or(p.value);
@@ -114,15 +104,20 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
     out
 }
 
-/// Refits one candidate on top of a hypothesis' simulation; `begun` is a fit from its best start that has not converged.
-pub fn refit<'d>(
+/// Refits one candidate on top of a hypothesis' simulation.
+pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
+    refit_from(setting, parent, candidate, starting_values(setting, parent, candidate), None)
+}
+
+/// Refits one candidate from these values; `begun` is a fit that has not converged and goes on in the place of the first of them.
+fn refit_from<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'_>,
     candidate: &Candidate,
+    mut froms: Vec<Values>,
     begun: Option<Base<'d>>,
 ) -> Option<Hypothesis<'d>> {
     let document = &candidate.refit.simulation;
-    let mut froms = starting_values(setting, parent, candidate);
     if let (Some(b), Some(first)) = (&begun, froms.first_mut()) {
         *first = b.values();
     }
@@ -175,8 +170,7 @@ fn hypothesis<'d>(
         written: candidate.refit.clone(),
         concealment: candidate.concealment(),
     });
-    let log_evidence = setting.evidence(&base);
-    Hypothesis { effects, base, log_evidence }
+    setting.hypothesis(effects, base)
 }
 
 /// Line search over shapes that least squares cannot move: where the derivative by the shape vanishes or the shape stands where it began,
@@ -247,8 +241,15 @@ const HOPELESS: f64 = 40.0;
 ///
 /// A few iterations from the best start tell who is hopeless; the others are refitted to the end, from all their starts.
 pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Candidate]) -> Vec<Hypothesis<'d>> {
-    let first: Vec<Option<Hypothesis<'d>>> = list.par_iter().map(|c| sketch(setting, parent, c)).collect();
-    let mut order: Vec<f64> = first.iter().flatten().map(|h| h.log_evidence).collect();
+    let first: Vec<(Vec<Values>, Option<Hypothesis<'d>>)> = list
+        .par_iter()
+        .map(|c| {
+            let froms = starting_values(setting, parent, c);
+            let sketched = sketch(setting, parent, c, &froms).map(|base| hypothesis(setting, parent, c, base));
+            (froms, sketched)
+        })
+        .collect();
+    let mut order: Vec<f64> = first.iter().flat_map(|(_, h)| h).map(|h| h.log_evidence).collect();
     order.sort_by(|a, b| b.total_cmp(a));
     let best = order.first().copied().unwrap_or(f64::NEG_INFINITY);
     let fourth = order.get(3).copied().unwrap_or(f64::NEG_INFINITY);
@@ -257,10 +258,9 @@ pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Ca
     let mut out: Vec<Hypothesis<'d>> = list
         .par_iter()
         .zip(first)
-        .filter_map(|(c, sketched)| match sketched {
+        .filter_map(|(c, (froms, sketched))| match sketched {
             Some(h) if h.log_evidence < threshold => Some(h),
-            Some(h) => refit(setting, parent, c, Some(h.base)),
-            None => refit(setting, parent, c, None),
+            sketched => refit_from(setting, parent, c, froms, sketched.map(|h| h.base)),
         })
         .collect();
     out.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -331,8 +331,7 @@ pub fn assemble<'d>(
         effects.push(Effect { mechanism: part.mechanism, slot, written, concealment: part.concealment });
     }
     let base = setting.fit(&document, &values, Some(&none.base.whitener), 1, iterations)?;
-    let log_evidence = setting.evidence(&base);
-    Some(Hypothesis { effects, base, log_evidence })
+    Some(setting.hypothesis(effects, base))
 }
 
 /// Goes on with a hypothesis that was fitted for a few iterations only.

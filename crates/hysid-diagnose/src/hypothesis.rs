@@ -102,6 +102,12 @@ impl<'d> Setting<'d> {
         fit_simulation(model, start, noise, rounds, LmOptions { iterations, ..LmOptions::default() }, self.noise)
     }
 
+    /// A fitted document as a hypothesis.
+    pub fn hypothesis(&self, effects: Vec<Effect>, base: Base<'d>) -> Hypothesis<'d> {
+        let log_evidence = self.evidence(&base);
+        Hypothesis { effects, base, log_evidence }
+    }
+
     /// The evidence of a fitted document.
     pub fn evidence(&self, base: &Base<'_>) -> f64 {
         let brought = base.model.unknowns().len().saturating_sub(self.own_unknowns) as f64;

@@ -297,10 +297,11 @@ impl<'d> Model<'d> {
                 return None;
             }
             for series in self.data.layout.series.iter().filter(|x| x.stretch == s) {
-                let rows = |samples: &[f64]| self.data.rows_of(series, samples);
-                prediction[series.rows.clone()].copy_from_slice(&rows(&sensitivity.response.outputs[series.output]));
+                prediction[series.rows.clone()]
+                    .copy_from_slice(&self.data.rows_of(series, &sensitivity.response.outputs[series.output]));
                 for (tangent, &c) in sensitivity.tangents.iter().zip(wanted) {
-                    columns[c][series.rows.clone()].copy_from_slice(&rows(&tangent[series.output]));
+                    columns[c][series.rows.clone()]
+                        .copy_from_slice(&self.data.rows_of(series, &tangent[series.output]));
                 }
             }
         }

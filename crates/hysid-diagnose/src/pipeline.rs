@@ -11,9 +11,8 @@ use crate::error::DiagnoseError;
 use crate::evidence::correlation_time;
 use crate::experiment::{present_separation, propose};
 use crate::file::*;
-use crate::fitting::is_far;
 use crate::hold::free_run;
-use crate::hypothesis::{Hypothesis, Setting};
+use crate::hypothesis::Setting;
 use crate::openset::correction;
 use crate::picture::Picture;
 use crate::records::*;
@@ -121,7 +120,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if request.holdout.is_empty() {
         notes.push("no hold-out recording was given: blocks of the recordings were held out and score the fit".into());
     }
-    let data = full.within(if full.thinned().step > 1 { MOST_SAMPLES } else { MOST_ROWS }).thinned();
+    let data = full.within(if full.own_step() > 1 { MOST_SAMPLES } else { MOST_ROWS }).thinned();
     notes.extend(data.notes.iter().filter(|n| !full.notes.contains(n)).cloned());
 
     (hooks.progress)("calibrating the simulation");
@@ -137,8 +136,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     };
     let base = calibrate(&mut setting, request)?;
     setting.own_unknowns = base.model.unknowns().len();
-    let log_evidence = setting.evidence(&base);
-    let none = Hypothesis { effects: Vec::new(), base, log_evidence };
+    let none = setting.hypothesis(Vec::new(), base);
 
     (hooks.progress)("looking for what could be missing");
     let evidence = none.base.evidence();
@@ -173,28 +171,34 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let tau = correlation_time(&data.layout, &none.base.fit.residual);
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(&plain, options, hooks);
-    let mut seen = false;
-    let mut gross = if none.base.gross() || is_far(&none.base) { plainly.start(&none) } else { None };
-    if let (Some((start, found)), true) = (&gross, test.p_value >= options.alpha)
+    let mut gross = if none.base.gross() || none.base.far() { plainly.start(&none) } else { None };
+    let look = match &gross {
+        Some((start, found)) => {
+            let words = ("chance", ": nearly all of it is the effect itself; blocks held out of the fit do");
+            Some((&plainly, start, found, words))
+        }
+        None if none.base.coloured() => {
+            let words = ("coloured noise", "; effects that were fitted predict blocks held out of the fit better");
+            Some((&search, &none, &candidates, words))
+        }
+        None => None,
+    };
+    let mut significant = test.p_value < options.alpha;
+    if !significant
+        && let Some((search, start, found, (from, but))) = look
         && !(hooks.expired)(COMPOSING)
-        && let Some(p) = plainly.second_look(start, found)
+        && let Some(p) = search.second_look(start, found)
     {
-        file.notes.push(format!("surrogates of the residual do not tell the mismatch from chance (p = {:.3}): nearly all of it is the effect itself; blocks held out of the fit do (p = {p:.1e})", test.p_value));
-        (file.mismatch.p_value, seen) = (finite(p.min(test.p_value)), true);
+        let blind = test.p_value;
+        file.notes.push(format!(
+            "surrogates of the residual do not tell the mismatch from {from} (p = {blind:.3}){but} (p = {p:.1e})"
+        ));
+        file.mismatch.p_value = finite(p.min(blind));
+        significant = true;
     }
-    if gross.is_none()
-        && test.p_value >= options.alpha
-        && none.base.coloured()
-        && !(hooks.expired)(COMPOSING)
-        && let Some(p) = search.second_look(&none, &candidates)
-    {
-        file.notes.push(format!("surrogates of the residual do not tell the mismatch from coloured noise (p = {:.3}); effects that were fitted predict blocks held out of the fit better (p = {p:.1e})", test.p_value));
-        (file.mismatch.p_value, seen) = (finite(p.min(test.p_value)), true);
-    }
-    let significant = seen || test.p_value < options.alpha;
     let mut pool = Vec::new();
     if significant && let Some((start, found)) = gross.take() {
-        pool = plainly.sets(&start, &found);
+        plainly.extend(&start, &found, &mut pool);
         let sets = search.under_noise(&none, &pool);
         let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
         if fine {
@@ -230,7 +234,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let winner = if significant { tie_broken(&pool, &blocks) } else { 0 };
     let remaining = (!pool[winner].effects.is_empty()).then(|| search.remains(&pool[winner]));
     let imperfect = remaining.as_ref().is_some_and(|t| t.p_value < options.alpha);
-    let log = log_weights(&pool, &blocks, winner, if imperfect { IMPERFECT_WEIGHT } else { EVIDENCE_WEIGHT });
+    let log = log_weights(&pool, &weighed, &blocks, winner, if imperfect { IMPERFECT_WEIGHT } else { EVIDENCE_WEIGHT });
     let probability = probabilities(&log, 1.0);
     let claims = weighed[winner].claims.clone();
     let mut support = supports(&claims, &weighed, &probability);
@@ -245,7 +249,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         }
     }
     // What is still far from the recording is not understood, whatever was gained.
-    if is_far(&pool[winner].base) {
+    if pool[winner].base.far() {
         support.iter_mut().for_each(Support::weaken);
     }
     // Two members of one family in one set: something of that kind, but neither of them as it stands.

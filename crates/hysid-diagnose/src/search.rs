@@ -62,6 +62,13 @@ const STOP_SCORE: f64 = 25.0;
 /// Candidates that are refitted alone.
 const SHORT_LIST: usize = 10;
 
+/// Share of the whitened residual's power that an effect must take to count without the surrogates.
+const LARGE: f64 = 0.25;
+/// Log evidence that speaks for a set without the surrogates.
+const SURE: f64 = 15.0;
+/// Share of the squared error on held-out blocks that noise never takes away.
+const HALF: f64 = 0.5;
+
 /// A search for sets of effects on one calibrated simulation.
 pub struct Search<'a, 'd> {
     /// What all fits share.
@@ -83,20 +90,12 @@ impl<'a, 'd> Search<'a, 'd> {
     /// The simulation without effects under this search's noise model, and what could be missing in it.
     pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
         let base = self.setting.fit(&self.setting.original, &none.base.values(), None, 2, 25)?;
-        let log_evidence = self.setting.evidence(&base);
-        let start = Hypothesis { effects: Vec::new(), base, log_evidence };
+        let start = self.setting.hypothesis(Vec::new(), base);
         let candidates = screen(&start.base, &self.setting.original, &start.base.evidence(), &|_, _| true);
         Some((start, candidates))
     }
 
-    /// Every set of effects that was fitted: the short list, the numerics, and what composition made of them.
-    pub fn sets(&self, none: &Hypothesis<'d>, candidates: &[Candidate]) -> Vec<Hypothesis<'d>> {
-        let mut pool = Vec::new();
-        self.extend(none, candidates, &mut pool);
-        pool
-    }
-
-    /// As [`Search::sets`], with sets that are there already.
+    /// Adds every set of effects that is fitted: the short list, the numerics, and what composition makes of them and of the sets there are.
     pub fn extend(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
         (self.hooks.progress)("refitting the likeliest effects");
         for h in refit_all(self.setting, none, &short_list(candidates, SHORT_LIST)) {
@@ -125,12 +124,8 @@ impl<'a, 'd> Search<'a, 'd> {
             .filter_map(|h| {
                 let document = h.base.model.simulation();
                 let base = self.setting.fit(document, &h.base.values(), None, 3, self.setting.iterations)?;
-                let log_evidence = self.setting.evidence(&base);
-                (base.log_likelihood > none.base.log_likelihood).then(|| Hypothesis {
-                    effects: h.effects.clone(),
-                    base,
-                    log_evidence,
-                })
+                (base.log_likelihood > none.base.log_likelihood)
+                    .then(|| self.setting.hypothesis(h.effects.clone(), base))
             })
             .collect()
     }
@@ -149,7 +144,7 @@ impl<'a, 'd> Search<'a, 'd> {
             let Some(candidate) = found.first() else {
                 return Err(DiagnoseError::Question(format!("{mechanism}@{slot}")));
             };
-            let Some(h) = refit(self.setting, parent, candidate, None) else { return Ok(None) };
+            let Some(h) = refit(self.setting, parent, candidate) else { return Ok(None) };
             set = Some(h);
         }
         Ok(set)
@@ -202,14 +197,7 @@ impl<'a, 'd> Search<'a, 'd> {
     }
 }
 
-/// Share of the squared error on held-out blocks that noise never takes away.
-const HALF: f64 = 0.5;
-/// Log evidence that speaks for a set without the surrogates.
-const SURE: f64 = 15.0;
 /// A question as it was typed.
 pub fn words(question: &Question) -> String {
     question.iter().map(|(m, s)| format!("{m}@{s}")).collect::<Vec<_>>().join("+")
 }
-
-/// Share of the whitened residual's power that an effect must take to count without the surrogates.
-const LARGE: f64 = 0.25;

@@ -5,6 +5,8 @@
 //! simulated outputs and their derivatives go through the same linear map, so nothing is approximated: the simulation itself still runs at
 //! the recorded rate with the recorded input.
 
+use std::borrow::Cow;
+
 use crate::mechanism::band_but_for;
 
 /// Share of an output's power that may lie above the fastest frequency.
@@ -30,9 +32,9 @@ pub fn step<'a>(signals: impl Iterator<Item = &'a [f64]>, period_s: f64, samples
 }
 
 /// Every `step`-th sample of the filtered series, the first one included; the kernel is cut and scaled at the ends.
-pub fn thin(x: &[f64], step: usize) -> Vec<f64> {
+pub fn thin(x: &[f64], step: usize) -> Cow<'_, [f64]> {
     if step <= 1 {
-        return x.to_vec();
+        return Cow::Borrowed(x);
     }
     let half = 3 * step;
     let kernel: Vec<f64> = (0..=half)
@@ -43,19 +45,17 @@ pub fn thin(x: &[f64], step: usize) -> Vec<f64> {
             sinc * 0.5 * (1.0 + (std::f64::consts::PI * i as f64 / (half + 1) as f64).cos())
         })
         .collect();
-    (0..x.len())
-        .step_by(step)
-        .map(|n| {
-            let (from, to) = (n.saturating_sub(half), (n + half).min(x.len() - 1));
-            let (mut sum, mut weight) = (0.0, 0.0);
-            for (m, v) in x.iter().enumerate().take(to + 1).skip(from) {
-                let k = kernel[m.abs_diff(n)];
-                sum += k * v;
-                weight += k;
-            }
-            sum / weight
-        })
-        .collect()
+    let rows = (0..x.len()).step_by(step).map(|n| {
+        let (from, to) = (n.saturating_sub(half), (n + half).min(x.len() - 1));
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (m, v) in x.iter().enumerate().take(to + 1).skip(from) {
+            let k = kernel[m.abs_diff(n)];
+            sum += k * v;
+            weight += k;
+        }
+        sum / weight
+    });
+    Cow::Owned(rows.collect())
 }
 
 #[cfg(test)]
@@ -68,11 +68,11 @@ mod tests {
 
     #[test]
     fn slow_signals_pass_and_fast_ones_do_not() {
-        let slow = thin(&sine(0.002, 2000), 10);
+        let slow = thin(&sine(0.002, 2000), 10).into_owned();
         for (n, v) in slow.iter().enumerate().skip(5).take(190) {
             assert!((v - (std::f64::consts::TAU * 0.002 * 10.0 * n as f64).sin()).abs() < 2e-3);
         }
-        let fast = thin(&sine(0.23, 2000), 10);
+        let fast = thin(&sine(0.23, 2000), 10).into_owned();
         assert!(fast.iter().skip(5).take(190).all(|v| v.abs() < 0.01));
         assert!(thin(&[3.0; 100], 7).iter().all(|v| (v - 3.0).abs() < 1e-12));
     }

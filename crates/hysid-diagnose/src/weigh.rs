@@ -5,8 +5,6 @@ use rayon::prelude::*;
 use crate::base::Base;
 use crate::compose::best_of;
 use crate::hypothesis::{Effect, Hypothesis, Setting, block_score};
-use crate::mechanism::Mechanism;
-use crate::slot::Slot;
 use crate::verdict::{Claim, Hypothesis as Weighed};
 
 /// Weight of the log evidence in the probabilities.
@@ -21,13 +19,12 @@ const NESTED_WEIGHT: f64 = 0.9;
 /// Log evidence that a further effect must bring before it counts.
 const PRICE_OF_AN_EFFECT: f64 = 4.0;
 
-pub fn claim(mechanism: &Mechanism, slot: &Slot) -> Claim {
-    Claim { mechanism: mechanism.id, family: mechanism.family.name(), slot: slot.label.clone() }
-}
-
+/// A fitted set as the verdict sees it: what it claims, and its evidence less the price of its effects.
 pub fn weigh(h: &Hypothesis<'_>) -> Weighed {
+    let claim =
+        |e: &Effect| Claim { mechanism: e.mechanism.id, family: e.mechanism.family.name(), slot: e.slot.label.clone() };
     Weighed {
-        claims: h.effects.iter().map(|e| claim(e.mechanism, &e.slot)).collect(),
+        claims: h.effects.iter().map(claim).collect(),
         log_evidence: h.log_evidence - PRICE_OF_AN_EFFECT * h.effects.len() as f64,
     }
 }
@@ -128,6 +125,7 @@ fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
 /// nothing on it pays nearly the full price of its further parameters: data that settle a parameter at its neutral value do speak.
 pub fn log_weights(
     pool: &[Hypothesis<'_>],
+    weighed: &[Weighed],
     blocks: &[Option<(f64, Vec<f64>)>],
     winner: usize,
     weight: f64,
@@ -137,7 +135,7 @@ pub fn log_weights(
     pool.iter()
         .enumerate()
         .map(|(i, h)| {
-            let mut log = weight * (h.log_evidence - PRICE_OF_AN_EFFECT * h.effects.len() as f64);
+            let mut log = weight * weighed[i].log_evidence;
             if let (Some(own), Some(best)) = (&blocks[i], best_block) {
                 log += 0.5 * weight * (own.0 - best).clamp(-10.0, 10.0);
             }

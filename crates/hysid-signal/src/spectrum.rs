@@ -3,6 +3,8 @@
 //! Densities are one-sided, in (unit squared)/Hz: summed over the lines and multiplied by their spacing they give the
 //! variance. Reference: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70-73.
 
+use std::cell::RefCell;
+
 use realfft::RealFftPlanner;
 
 /// What can be wrong with a request for a spectrum.
@@ -126,12 +128,17 @@ pub fn cross_spectrum(u: &[f64], y: &[f64], period_s: f64, segment: usize) -> Re
     Ok(sum)
 }
 
+thread_local! {
+    /// Plans by length: a caller that whitens a thousand columns of one length asks for the same plan a thousand times.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
+
 /// The discrete Fourier transform of a real signal, `sum u[n] exp(-2 pi i k n/N)` for `k` from 0 to `N/2`, as (real, imaginary).
 pub fn fourier(u: &[f64]) -> Vec<(f64, f64)> {
     if u.is_empty() {
         return Vec::new();
     }
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(u.len());
+    let plan = PLANNER.with_borrow_mut(|p| p.plan_fft_forward(u.len()));
     let (mut input, mut output) = (u.to_vec(), plan.make_output_vec());
     // The transform fails only on slices of a wrong length, and these come from the plan.
     let done = plan.process(&mut input, &mut output);
@@ -144,7 +151,7 @@ pub fn inverse_fourier(lines: &[(f64, f64)], samples: usize) -> Vec<f64> {
     if samples == 0 {
         return Vec::new();
     }
-    let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(samples);
+    let plan = PLANNER.with_borrow_mut(|p| p.plan_fft_inverse(samples));
     let (mut input, mut output) = (plan.make_input_vec(), plan.make_output_vec());
     for (c, (re, im)) in input.iter_mut().zip(lines) {
         (c.re, c.im) = (*re, *im);

@@ -6,6 +6,7 @@
 mod cut;
 mod windows;
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -89,7 +90,7 @@ impl DataSet {
                     }
                     let rows = y.len()..y.len() + count;
                     let last = range.start + (count - 1) * step;
-                    y.extend(thin(&column[range.start..=last], step));
+                    y.extend_from_slice(&thin(&column[range.start..=last], step));
                     layout.series.push(Series { stretch, output, first: range.start, rows });
                 }
             }
@@ -120,13 +121,13 @@ impl DataSet {
     pub fn stack(&self, outputs: &[Vec<Vec<f64>>]) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.rows());
         for s in &self.layout.series {
-            out.extend(self.rows_of(s, &outputs[s.stretch][s.output]));
+            out.extend_from_slice(&self.rows_of(s, &outputs[s.stretch][s.output]));
         }
         out
     }
 
     /// The rows of a series from the samples of its stretch.
-    pub fn rows_of(&self, series: &Series, samples: &[f64]) -> Vec<f64> {
+    pub fn rows_of<'a>(&self, series: &Series, samples: &'a [f64]) -> Cow<'a, [f64]> {
         let last = series.first + series.rows.len().saturating_sub(1) * self.step;
         thin(&samples[series.first..=last], self.step)
     }
@@ -157,10 +158,15 @@ impl DataSet {
         Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, notes, self.step)
     }
 
+    /// Samples for each row that the outputs need.
+    pub fn own_step(&self) -> usize {
+        let outputs = self.stretches.iter().flat_map(|s| s.outputs.iter().map(Vec::as_slice));
+        step(outputs, self.period_s, self.samples())
+    }
+
     /// The same data with as few rows as its signals need.
     pub fn thinned(&self) -> Self {
-        let outputs = self.stretches.iter().flat_map(|s| s.outputs.iter().map(Vec::as_slice));
-        let step = step(outputs, self.period_s, self.samples());
+        let step = self.own_step();
         if step == 1 {
             return self.clone();
         }
