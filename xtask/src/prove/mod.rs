@@ -7,6 +7,7 @@
 #[cfg(test)]
 mod agreement;
 mod black;
+mod controls;
 mod experiment;
 mod guard;
 mod linear;
@@ -26,6 +27,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, ensure};
 use hysid_concealed::bank;
+use hysid_concealed::case::{Case, Wanted};
 use hysid_concealed::seed::Stream;
 use score::{Row, Score};
 use trial::Bench;
@@ -54,6 +56,9 @@ pub struct Args {
     /// Draw from the development stream, which may be tuned on; docs/proof.md is left alone
     #[arg(long)]
     development: bool,
+    /// Only the controls among the cases, where nothing is missing: false alarms in all and for each kind of noise; docs/proof.md is left alone
+    #[arg(long, conflicts_with_all = ["quick", "write"])]
+    controls: bool,
     /// Only write the bank below this directory: cases/, and labels.json beside it
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
@@ -90,14 +95,30 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let start = Instant::now();
     let root = std::env::temp_dir().join(format!("hysid-prove-{}", std::process::id()));
     let bench = Bench { binary, root: root.clone(), time_limit: Duration::from_secs(args.time_limit) };
-    let longest = args.longest.unwrap_or(if args.quick { 2000 } else { usize::MAX });
-    let rows =
-        trials(&bench, stream, args.seed, range, longest, args.minutes.map(|m| start + Duration::from_secs(60 * m)));
+    let bank = Bank {
+        stream,
+        seed: args.seed,
+        range,
+        longest: args.longest.unwrap_or(if args.quick { 2000 } else { usize::MAX }),
+        deadline: args.minutes.map(|m| start + Duration::from_secs(60 * m)),
+    };
+    let done =
+        if args.controls { controls::run(&bench, &bank, args, start) } else { whole(&bench, &bank, args, start) };
     let _ = std::fs::remove_dir_all(&root);
-    let rows = rows?;
+    done
+}
+
+/// Diagnoses and scores every case, beside the competitors.
+fn whole(bench: &Bench, bank: &Bank, args: &Args, start: Instant) -> anyhow::Result<()> {
+    let rows = bank.each(&|_| true, &|case| {
+        let trial = bench.run(case)?;
+        let mut row = Row::new(case, trial, rivals::rivals(bench, case));
+        row.settled = bench.experiment(case, &row)?;
+        Ok(row)
+    })?;
     let score = score::score(&rows);
     let took = start.elapsed().as_secs_f64();
-    let command = command(args, if args.minutes.is_some() { rows.len() } else { count });
+    let command = command(args, if args.minutes.is_some() { rows.len() } else { bank.range.len() });
     let text = page::markdown(&score, &command, took, &rows);
     println!("{text}");
     let out = crate::root().join(&args.out);
@@ -107,7 +128,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let labels: Vec<_> = rows.iter().map(|r| &r.label).collect();
     std::fs::write(out.join("labels.json"), serde_json::to_string_pretty(&labels)?)?;
     println!("page, cases and labels: {}", out.display());
-    if stream == Stream::Reporting {
+    if bank.stream == Stream::Reporting {
         page::record(&crate::root().join("docs/proof.md"), &text, &score, &command, took)?;
     }
     if args.quick {
@@ -116,47 +137,56 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Every case made, diagnosed and compared with its rivals, in the order of the bank. After `deadline` no further case is begun, so
-/// that what is scored is the beginning of the bank and not a choice of quick cases.
-fn trials(
-    bench: &Bench,
+/// The cases that are run.
+struct Bank {
     stream: Stream,
     seed: u64,
     range: Range<usize>,
+    /// Cases with more samples are left out.
     longest: usize,
+    /// No case is begun after it, so that what is scored is the beginning of the bank and not a choice of quick cases.
     deadline: Option<Instant>,
-) -> anyhow::Result<Vec<Row>> {
-    let next = AtomicUsize::new(range.start);
-    let worker = || -> anyhow::Result<Vec<(usize, Row)>> {
-        let mut rows = Vec::new();
-        loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            if i >= range.end || deadline.is_some_and(|d| Instant::now() > d) {
-                return Ok(rows);
+}
+
+impl Bank {
+    /// Every case whose plan is `wanted`, made and worked on side by side; results in the order of the bank.
+    fn each<T: Send>(
+        &self,
+        wanted: &(dyn Fn(&Wanted) -> bool + Sync),
+        work: &(dyn Fn(&Case) -> anyhow::Result<T> + Sync),
+    ) -> anyhow::Result<Vec<T>> {
+        let next = AtomicUsize::new(self.range.start);
+        let worker = || -> anyhow::Result<Vec<(usize, T)>> {
+            let mut list = Vec::new();
+            loop {
+                let i = next.fetch_add(1, Ordering::Relaxed);
+                if i >= self.range.end || self.deadline.is_some_and(|d| Instant::now() > d) {
+                    return Ok(list);
+                }
+                if !wanted(&bank::plan(self.stream, self.seed, i)) {
+                    continue;
+                }
+                let case = bank::case(self.stream, self.seed, i);
+                if case.label.samples > self.longest {
+                    continue;
+                }
+                list.push((i, work(&case)?));
+                if (i + 1).is_multiple_of(20) {
+                    eprintln!("{} of {}", i + 1 - self.range.start, self.range.len());
+                }
             }
-            let case = bank::case(stream, seed, i);
-            if case.label.samples > longest {
-                continue;
+        };
+        let mut list = std::thread::scope(|scope| -> anyhow::Result<Vec<(usize, T)>> {
+            let threads: Vec<_> = (0..SIDE_BY_SIDE).map(|_| scope.spawn(worker)).collect();
+            let mut list = Vec::new();
+            for thread in threads {
+                list.extend(thread.join().map_err(|_| anyhow::anyhow!("a worker panicked"))??);
             }
-            let trial = bench.run(&case)?;
-            let mut row = Row::new(&case, trial, rivals::rivals(bench, &case));
-            row.settled = bench.experiment(&case, &row)?;
-            rows.push((i, row));
-            if (i + 1).is_multiple_of(20) {
-                eprintln!("{} of {}", i + 1 - range.start, range.len());
-            }
-        }
-    };
-    let mut rows = std::thread::scope(|scope| -> anyhow::Result<Vec<(usize, Row)>> {
-        let threads: Vec<_> = (0..SIDE_BY_SIDE).map(|_| scope.spawn(worker)).collect();
-        let mut rows = Vec::new();
-        for thread in threads {
-            rows.extend(thread.join().map_err(|_| anyhow::anyhow!("a worker panicked"))??);
-        }
-        Ok(rows)
-    })?;
-    rows.sort_by_key(|r| r.0);
-    Ok(rows.into_iter().map(|r| r.1).collect())
+            Ok(list)
+        })?;
+        list.sort_by_key(|r| r.0);
+        Ok(list.into_iter().map(|r| r.1).collect())
+    }
 }
 
 fn build() -> anyhow::Result<PathBuf> {
@@ -177,7 +207,7 @@ fn command(args: &Args, count: usize) -> String {
     if args.first > 0 {
         text.push_str(&format!(" --first {}", args.first));
     }
-    for (flag, on) in [("--quick", args.quick), ("--development", args.development)] {
+    for (flag, on) in [("--quick", args.quick), ("--development", args.development), ("--controls", args.controls)] {
         if on {
             text.push(' ');
             text.push_str(flag);

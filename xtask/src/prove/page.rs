@@ -9,6 +9,7 @@ use hysid_report::page::{Align, Page, Table};
 
 use super::score::{CELLS, Line, Row, Score, Standing};
 use super::stats::quantile;
+use super::verdict::Verdict;
 
 fn number(v: f64, share: bool) -> String {
     match (v.is_finite(), share) {
@@ -32,6 +33,11 @@ fn standing(line: &Line) -> &'static str {
         Standing::Missed => "**missed**",
         Standing::Open => "-",
     }
+}
+
+/// Lines of the score as a table in Markdown.
+pub fn lines(text: &mut String, lines: &[Line]) {
+    table(text, &HEAD, lines.iter().map(cells));
 }
 
 const HEAD: [&str; 6] = ["", "target", "reached", "95 % interval", "n", ""];
@@ -72,19 +78,21 @@ fn difficulty(score: &Score) -> Vec<Vec<String>> {
 
 const DIFFICULTY: [&str; 8] = ["DNR", "n", "detected", "family", "mechanism", "slot", "after/before", "after/oracle"];
 
-fn times(score: &Score) -> String {
+/// How long a diagnosis takes, from the seconds of each.
+pub fn times(seconds: &[f64]) -> String {
     format!(
         "median {:.1} s, 90th percentile {:.1} s, longest {:.1} s (one thread each, two processes side by side)",
-        quantile(&score.seconds, 0.5),
-        quantile(&score.seconds, 0.9),
-        quantile(&score.seconds, 1.0)
+        quantile(seconds, 0.5),
+        quantile(seconds, 0.9),
+        quantile(seconds, 1.0)
     )
 }
 
 /// The result as Markdown.
 pub fn markdown(score: &Score, command: &str, took: f64, rows: &[Row]) -> String {
-    let mut text = format!("`{command}`: {} cases in {took:.0} s; a diagnosis takes {}.\n\n", rows.len(), times(score));
-    table(&mut text, &HEAD, score.lines.iter().map(cells));
+    let mut text =
+        format!("`{command}`: {} cases in {took:.0} s; a diagnosis takes {}.\n\n", rows.len(), times(&score.seconds));
+    lines(&mut text, &score.lines);
     text.push_str("By difficulty, single effects:\n\n");
     table(&mut text, &DIFFICULTY, difficulty(score));
     text.push_str("Median held-out error over that of the recalibrated simulation, effects of the catalogue:\n\n");
@@ -119,22 +127,27 @@ pub fn markdown(score: &Score, command: &str, took: f64, rows: &[Row]) -> String
     text
 }
 
+/// A verdict in one line.
+pub fn said(verdict: &Result<Verdict, String>) -> String {
+    match verdict {
+        Err(e) => format!("BROKEN {e}"),
+        Ok(v) => {
+            let list: Vec<String> = v
+                .effects
+                .iter()
+                .map(|s| format!("{}@{} {:.2}/{:.2}", s.mechanism, s.slot, s.probability, s.family_probability))
+                .collect();
+            format!("{} [{}] p={:?}", v.kind, list.join(", "), v.p_value)
+        }
+    }
+}
+
 /// One line for each case.
 pub fn cases(rows: &[Row]) -> String {
     let mut text = String::new();
     for r in rows {
         let truth: Vec<String> = r.label.effects.iter().map(|e| format!("{}@{}", e.mechanism, e.slots[0])).collect();
-        let said = match &r.trial.verdict {
-            Err(e) => format!("BROKEN {e}"),
-            Ok(v) => {
-                let list: Vec<String> = v
-                    .effects
-                    .iter()
-                    .map(|s| format!("{}@{} {:.2}/{:.2}", s.mechanism, s.slot, s.probability, s.family_probability))
-                    .collect();
-                format!("{} [{}] p={:?}", v.kind, list.join(", "), v.p_value)
-            }
-        };
+        let said = said(&r.trial.verdict);
         let own = r.verdict().and_then(|v| v.own_fit);
         let mark = if r.mechanisms_right() {
             "ok "
@@ -226,7 +239,7 @@ pub fn html(score: &Score, command: &str, took: f64, rows: &[Row]) -> String {
     for line in &score.firm_wrong {
         page.text(line);
     }
-    page.foot(format!("{command}; {took:.0} s; a diagnosis takes {}", times(score)));
+    page.foot(format!("{command}; {took:.0} s; a diagnosis takes {}", times(&score.seconds)));
     page.render()
 }
 

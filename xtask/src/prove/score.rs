@@ -188,6 +188,20 @@ fn figure(what: &str, target: &str, values: &[f64], q: f64, limit: f64, gate: bo
     }
 }
 
+/// The lines of the false alarms, in all and under each kind of noise, from every control's noise and whether there was an alarm.
+pub fn false_alarms(controls: &[(Noise, bool)]) -> Vec<Line> {
+    let line = |what: &str, target: &str, limit: f64, of: &dyn Fn(Noise) -> bool| {
+        let list: Vec<bool> = controls.iter().filter(|c| of(c.0)).map(|c| c.1).collect();
+        share(what, target, list.iter().filter(|a| **a).count(), list.len(), limit, true, true)
+    };
+    let mut lines = vec![line("False alarms on controls", "<= 1.5 %", 0.015, &|_| true)];
+    for kind in Noise::ALL {
+        let what = format!("- under {} noise", kind.name().replace('_', " "));
+        lines.push(line(&what, "<= 3 %", 0.03, &|noise| noise == kind));
+    }
+    lines
+}
+
 /// Scores the rows.
 pub fn score(rows: &[Row]) -> Score {
     let count = |list: &[&Row], test: &dyn Fn(&Row) -> bool| list.iter().filter(|r| test(r)).count();
@@ -199,21 +213,8 @@ pub fn score(rows: &[Row]) -> Score {
     let strong: Vec<&Row> = singles.iter().copied().filter(|r| r.label.dnr > 0.4).collect();
     let weak: Vec<&Row> = singles.iter().copied().filter(|r| r.label.dnr < 0.4).collect();
 
-    let mut lines = Vec::new();
-    lines.push(share(
-        "False alarms on controls",
-        "<= 1.5 %",
-        count(&controls, &alarmed),
-        controls.len(),
-        0.015,
-        true,
-        true,
-    ));
-    for kind in Noise::ALL {
-        let list: Vec<&Row> = controls.iter().copied().filter(|r| r.label.noise == kind).collect();
-        let what = format!("- under {} noise", kind.name().replace('_', " "));
-        lines.push(share(&what, "<= 3 %", count(&list, &alarmed), list.len(), 0.03, true, true));
-    }
+    let heard: Vec<(Noise, bool)> = controls.iter().map(|r| (r.label.noise, alarmed(r))).collect();
+    let mut lines = false_alarms(&heard);
     let firm_wrong: Vec<String> = rows.iter().filter_map(firm_and_wrong).collect();
     lines.push(share("Firm and wrong, of all cases", "<= 2 %", firm_wrong.len(), rows.len(), 0.02, true, true));
     lines.push(share(
