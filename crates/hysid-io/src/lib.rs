@@ -1,6 +1,7 @@
 //! Files: recordings as CSV with errors that name file, line and column; versioned model files; write, then rename.
 //!
-//! * [`read_recording`] turns a CSV file into a [`hysid_signal::Recording`]; [`CsvChunks`] streams one that does not fit into memory.
+//! * [`read_recording`] turns a CSV file into a [`hysid_signal::Recording`]; [`CsvChunks`] reads one that does not fit into memory by blocks of rows,
+//!   [`CsvStream`] on threads and as fast as it can.
 //! * [`require`] judges a recording against what a caller needs of it: a column that exists, that varies, that is long enough.
 //! * [`write_csv`], [`write_text`] and [`write_json`] put a file in place by a rename, so that no reader sees half of it.
 //! * [`read_versioned`] and [`write_versioned`] keep a `format_version` in every model file.
@@ -14,15 +15,21 @@ mod clock;
 mod error;
 mod json;
 mod npy;
+mod number;
 mod read;
 pub mod require;
+mod rows;
+mod stream;
+mod text;
 mod write;
 
 pub use atomic::write_bytes;
-pub use chunks::{Chunk, CsvChunks};
+pub use chunks::CsvChunks;
 pub use clock::{ClockFit, fit_clock};
 pub use error::{InputError, InputProblem, WriteError};
 pub use json::{read_json, read_versioned, write_json, write_versioned};
 pub use npy::{Npy, NpyError, read_npy};
 pub use read::{LARGEST_VALUE, ReadOptions, TimeSource, read_recording};
+pub use rows::Chunk;
+pub use stream::CsvStream;
 pub use write::{format_number, write_csv, write_recording, write_text};
