@@ -10,6 +10,8 @@
 //! 3. [`Design`] joins a dictionary and recordings ([`Record`]): one row for each sample that has all its lags inside
 //!    one gap-free stretch. It is a [`hysid_linalg::Columns`], so `hysid-select` can pick from it, and it never stores
 //!    the dictionary. [`Design::target`] is the target.
+//!    Where the recordings do not fit into memory, [`GramSums`] adds up the Gram matrix of the dictionary from blocks of
+//!    samples.
 //! 4. [`Model`] is a list of terms with coefficients: one step ahead and free run.
 //!
 //! # Terms as text
@@ -33,9 +35,11 @@
 //! first larger difference of a stretch it is +1. Its square is therefore 1 exactly, and candidates that differ by
 //! such a square are the same candidate.
 
+mod accumulate;
 mod collinear;
 mod design;
 mod dictionary;
+mod distinct;
 mod error;
 mod kernel;
 mod model;
@@ -45,6 +49,7 @@ mod signals;
 mod spec;
 mod term;
 
+pub use accumulate::GramSums;
 pub use design::Design;
 pub use dictionary::{Dictionary, Dropped, DroppedReason};
 pub use error::DictionaryError;

@@ -20,6 +20,19 @@ pub struct Start {
     pub target: f64,
 }
 
+/// All inner products of the columns of a matrix and a target: what is left of the samples when they are gone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gram {
+    /// Phi'Phi, M x M for M columns.
+    pub matrix: Matrix,
+    /// Inner product of each column with the target.
+    pub cross: Vec<f64>,
+    /// Squared 2-norm of the target.
+    pub target: f64,
+    /// Number of rows (samples) that were added up.
+    pub rows: usize,
+}
+
 /// A matrix Phi with `rows()` samples and `cols()` candidates, of which a caller asks products, never the whole.
 ///
 /// Only [`Columns::fill`] has to be written; the products have plain implementations by tiles of rows, which a structured

@@ -1,0 +1,308 @@
+//! The distinct products behind the Gram matrix of a dictionary, and the kernel that sums them up.
+//!
+//! The inner product of two terms depends on the product of their factors only, and a product of lagged signals one sample later is the same
+//! sum but for its ends. So the M (M + 1) / 2 inner products of M candidates are sums over far fewer products (286 candidates of degree 3 in
+//! ten lagged signals: 41 041 inner products, 5126 sums). Each class of products that differ by a shift in time only is summed up once; its other
+//! members follow from what enters and leaves at the ends of a stretch (see [`Class::least`]).
+//!
+//! A product is a head times a tail, the tail being its factors of largest lag, half of the degree. Heads with the same tails are the rows,
+//! those tails the columns of a small matrix product over each tile of samples.
+
+use std::collections::{BTreeMap, HashMap};
+
+use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, multiply, pack, total};
+use hysid_linalg::product;
+
+use crate::{Factor, Quantity, Signal, Term};
+
+/// Samples in a tile: heads and tails of a tile stay in the second-level cache.
+pub(crate) const TILE: usize = 256;
+const T: usize = TILE / LANE;
+
+/// Products that differ by a shift in time only.
+#[derive(Debug, Clone)]
+pub(crate) struct Class {
+    /// The factors, by lag, the smallest lag being 0.
+    pub factors: Vec<Factor>,
+    /// The shift that is summed up.
+    pub base: usize,
+    /// The smallest and largest shift in use. With S(s) the sum over the rows a..b of the product shifted by s,
+    /// S(s) - S(s + 1) = c(b - 1 - s) - c(a - 1 - s), where c is the product as it stands here.
+    pub least: usize,
+    pub most: usize,
+}
+
+/// A member of a class.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Member {
+    pub class: u32,
+    pub shift: u32,
+}
+
+/// Which sums the Gram matrix of some terms consists of.
+#[derive(Debug)]
+pub(crate) struct Distinct {
+    pub classes: Vec<Class>,
+    /// Inner product of terms i <= j at j (j + 1) / 2 + i.
+    pub gram: Vec<Member>,
+    /// Inner product of each term with the output.
+    pub cross: Vec<Member>,
+    /// The output's square.
+    pub target: Member,
+}
+
+impl Distinct {
+    pub fn new(terms: &[Term]) -> Self {
+        let mut classes: Vec<Class> = Vec::new();
+        let mut known: HashMap<Vec<Factor>, u32> = HashMap::new();
+        let mut member = |a: &[Factor], b: &[Factor]| {
+            let mut factors = Term::new(a.iter().chain(b).copied()).factors().to_vec();
+            factors.sort_by_key(|f| (f.lag, f.quantity));
+            let shift = factors.first().map_or(0, |f| f.lag);
+            factors.iter_mut().for_each(|f| f.lag -= shift);
+            let class = *known.entry(factors).or_insert_with_key(|factors| {
+                classes.push(Class { factors: factors.clone(), base: shift, least: shift, most: shift });
+                (classes.len() - 1) as u32
+            });
+            let c = &mut classes[class as usize];
+            (c.least, c.most) = (c.least.min(shift), c.most.max(shift));
+            Member { class, shift: shift as u32 }
+        };
+        let mut gram = Vec::with_capacity(terms.len() * (terms.len() + 1) / 2);
+        for (j, b) in terms.iter().enumerate() {
+            gram.extend(terms[..=j].iter().map(|a| member(a.factors(), b.factors())));
+        }
+        let output = [Factor::value(Signal::Output, 0)];
+        let cross = terms.iter().map(|t| member(t.factors(), &output)).collect();
+        let target = member(&output, &output);
+        // Summed up is the smallest shift that the matrix itself needs: then most sums begin at the same lag and share their heads.
+        let mut least = vec![usize::MAX; classes.len()];
+        for m in &gram {
+            least[m.class as usize] = least[m.class as usize].min(m.shift as usize);
+        }
+        for (c, least) in classes.iter_mut().zip(least) {
+            c.base = if least == usize::MAX { c.least } else { least };
+        }
+        Self { classes, gram, cross, target }
+    }
+}
+
+/// One quantity or product of quantities over a tile and the lags before it.
+#[derive(Debug)]
+struct Series {
+    /// The channel, or where in the tile's buffer the two factors begin.
+    source: Source,
+    /// The largest and smallest shift: the series begins that many samples before the tile.
+    most: usize,
+    least: usize,
+    /// Where it begins in the tile's buffer.
+    at: usize,
+}
+
+#[derive(Debug)]
+enum Source {
+    Channel(usize),
+    Product(usize, usize),
+}
+
+impl Series {
+    fn len(&self) -> usize {
+        TILE + self.most - self.least
+    }
+}
+
+/// Heads that have the same tails.
+#[derive(Debug)]
+struct Group {
+    rows: Vec<Row>,
+    /// Where in the tile's buffer each tail begins.
+    columns: Vec<u32>,
+}
+
+/// How the classes are summed up over tiles.
+#[derive(Debug)]
+pub(crate) struct Kernel {
+    series: Vec<Series>,
+    /// Length of the tile's buffer.
+    len: usize,
+    /// Each head but the first, which is empty, as an earlier head times the samples that begin in the tile's buffer.
+    heads: Vec<(usize, usize)>,
+    groups: Vec<Group>,
+    /// The class of each sum.
+    order: Vec<u32>,
+    classes: usize,
+    machine: Machine,
+}
+
+impl Kernel {
+    /// The kernel for these classes of products of `quantities`.
+    pub fn new(classes: &[Class], quantities: &[Quantity]) -> Self {
+        let half = classes.iter().map(|c| c.factors.len()).max().unwrap_or(0).div_ceil(2).max(1);
+        // Series by descending degree, so that what a series is made of is asked for before it is made itself.
+        let mut needed = Needed::new();
+        let parts: Vec<(Vec<Factor>, Vec<Factor>)> = classes
+            .iter()
+            .map(|c| {
+                let all: Vec<Factor> = c.factors.iter().map(|f| Factor { lag: f.lag + c.base, ..*f }).collect();
+                let (head, tail) = all.split_at(all.len().saturating_sub(half));
+                (head.to_vec(), tail.to_vec())
+            })
+            .collect();
+        for (head, tail) in parts.iter().filter(|(_, tail)| !tail.is_empty()) {
+            need(&mut needed, tail, (0, 0));
+            head.iter().for_each(|f| need(&mut needed, &[*f], (0, 0)));
+        }
+        for degree in (2..=half).rev() {
+            let of_degree: Vec<_> =
+                needed.range((degree, Vec::new())..(degree + 1, Vec::new())).map(|(k, r)| (k.1.clone(), *r)).collect();
+            for (factors, range) in of_degree {
+                if let Some((last, before)) = factors.split_last() {
+                    need(&mut needed, before, range);
+                    need(&mut needed, &[*last], range);
+                }
+            }
+        }
+        let mut series: Vec<Series> = Vec::with_capacity(needed.len());
+        let mut index: HashMap<Vec<Factor>, usize> = HashMap::new();
+        let mut len = 0;
+        for ((_, factors), (least, most)) in needed {
+            let place = |factors: &[Factor], shift: usize| place(&series, &index, factors, shift);
+            let source = match factors.split_last() {
+                Some((last, before)) if !before.is_empty() => {
+                    Source::Product(place(before, most), place(std::slice::from_ref(last), most))
+                }
+                _ => Source::Channel(
+                    factors.first().and_then(|f| quantities.binary_search(&f.quantity).ok()).unwrap_or(0),
+                ),
+            };
+            index.insert(factors, series.len());
+            series.push(Series { source, most, least, at: len });
+            len += TILE + most - least;
+        }
+        // Heads, shorter ones first; each with its tails.
+        let mut by_head: BTreeMap<(usize, Vec<Factor>), Vec<(u32, u32)>> = BTreeMap::new();
+        for (class, (head, tail)) in parts.iter().enumerate().filter(|(_, (_, tail))| !tail.is_empty()) {
+            for n in 0..head.len() {
+                by_head.entry((n, head[..n].to_vec())).or_default();
+            }
+            let tail = place(&series, &index, tail, 0) as u32;
+            by_head.entry((head.len(), head.clone())).or_default().push((tail, class as u32));
+        }
+        by_head.entry((0, Vec::new())).or_default();
+        let numbers: HashMap<Vec<Factor>, usize> =
+            by_head.keys().enumerate().map(|(n, (_, h))| (h.clone(), n)).collect();
+        let mut heads = Vec::with_capacity(by_head.len());
+        let mut shared: BTreeMap<Vec<u32>, Vec<(usize, Vec<u32>)>> = BTreeMap::new();
+        for (n, ((_, head), mut tails)) in by_head.into_iter().enumerate() {
+            if let Some((last, before)) = head.split_last() {
+                let factor = place(&series, &index, std::slice::from_ref(last), 0);
+                heads.push((numbers.get(before).copied().unwrap_or(0), factor));
+            }
+            tails.sort_unstable();
+            let (columns, own): (Vec<u32>, Vec<u32>) = tails.into_iter().unzip();
+            if !columns.is_empty() {
+                shared.entry(columns).or_default().push((n, own));
+            }
+        }
+        let mut order = Vec::with_capacity(classes.len());
+        let mut groups = Vec::with_capacity(shared.len());
+        for (columns, members) in shared {
+            let mut rows = Vec::with_capacity(members.len());
+            for (head, own) in members {
+                rows.push(Row { from: head * T, to: order.len() });
+                order.extend(own);
+            }
+            groups.push(Group { rows, columns });
+        }
+        Self { series, len, heads, groups, order, classes: classes.len(), machine: Machine::detect() }
+    }
+
+    /// Multiply-adds for each sample.
+    pub fn work(&self) -> usize {
+        self.order.len() + self.series.len() + self.heads.len()
+    }
+
+    /// The sums of all classes over these ranges of rows, in the order of the classes; `channels` hold the quantities.
+    pub fn sums(&self, work: &mut Work, channels: &[Vec<f64>], rows: &[std::ops::Range<usize>]) -> Vec<f64> {
+        work.sums.fill(Lane::default());
+        for range in rows {
+            let mut at = range.start;
+            while at < range.end {
+                let len = TILE.min(range.end - at);
+                self.tile(work, channels, at, len);
+                at += len;
+            }
+        }
+        let mut sums = vec![0.0; self.classes];
+        for (lane, &class) in work.sums.iter().zip(&self.order) {
+            sums[class as usize] = total(lane);
+        }
+        sums
+    }
+
+    /// Adds the `len` rows from `at` on.
+    fn tile(&self, work: &mut Work, channels: &[Vec<f64>], at: usize, len: usize) {
+        let Work { tile, heads, sums } = work;
+        for s in &self.series {
+            let (made, rest) = tile.split_at_mut(s.at);
+            let out = &mut rest[..s.len()];
+            match s.source {
+                Source::Channel(c) => {
+                    let filled = s.most - s.least + len;
+                    out[..filled].copy_from_slice(&channels[c][at - s.most..at - s.least + len]);
+                    out[filled..].fill(0.0);
+                }
+                Source::Product(a, b) => product(&made[a..], &made[b..], out),
+            }
+        }
+        // The empty head is 1 on the rows and 0 beyond them, and so every head is 0 beyond them.
+        pack(&[1.0; TILE][..len], &mut heads[..T]);
+        for (n, &(before, factor)) in self.heads.iter().enumerate() {
+            let (made, rest) = heads.split_at_mut((n + 1) * T);
+            multiply(&made[before * T..(before + 1) * T], &tile[factor..factor + TILE], &mut rest[..T], self.machine);
+        }
+        for group in &self.groups {
+            let (rows, columns) = (&group.rows[..], &group.columns[..]);
+            Step { t: T, rows, left: heads, columns, right: tile, out: sums }.run(self.machine);
+        }
+    }
+}
+
+/// Series by degree and factors, the first of lag 0, with the smallest and largest shift.
+type Needed = BTreeMap<(usize, Vec<Factor>), (usize, usize)>;
+
+/// The factors without the lag of the first, and that lag.
+fn without_shift(factors: &[Factor]) -> (Vec<Factor>, usize) {
+    let first = factors.first().map_or(0, |f| f.lag);
+    (factors.iter().map(|f| Factor { lag: f.lag - first, ..*f }).collect(), first)
+}
+
+/// Asks for the product of these factors at these further shifts.
+fn need(needed: &mut Needed, factors: &[Factor], (least, most): (usize, usize)) {
+    let (own, first) = without_shift(factors);
+    let range = needed.entry((factors.len(), own)).or_insert((least + first, most + first));
+    *range = (range.0.min(least + first), range.1.max(most + first));
+}
+
+/// Where in the tile's buffer the product of these factors, shifted further, begins.
+fn place(series: &[Series], index: &HashMap<Vec<Factor>, usize>, factors: &[Factor], shift: usize) -> usize {
+    let (own, first) = without_shift(factors);
+    index.get(&own).and_then(|&i| series.get(i)).map_or(0, |s| s.at + s.most - first - shift)
+}
+
+/// The buffers of one thread.
+pub(crate) struct Work {
+    tile: Vec<f64>,
+    heads: Vec<Lane>,
+    sums: Vec<Lane>,
+}
+
+impl Work {
+    pub fn new(kernel: &Kernel) -> Self {
+        Self {
+            tile: vec![0.0; kernel.len],
+            heads: vec![Lane::default(); (kernel.heads.len() + 1) * T],
+            sums: vec![Lane::default(); kernel.order.len()],
+        }
+    }
+}
