@@ -4,7 +4,8 @@ mod common;
 
 use std::path::Path;
 
-use common::{BASELINE, OscillatorFiles, files_of, hysid};
+use common::oscillator::BASELINE;
+use common::{DIAGNOSE, OscillatorFiles, files_of, hysid, with_files};
 
 /// A case: what is done to the good files in the folder, the command line, and what the message must hold.
 struct Case {
@@ -14,22 +15,7 @@ struct Case {
     message: &'static [&'static str],
 }
 
-const GOOD: [&str; 8] = ["diagnose", "base.sim.toml", "--recording", "est.csv", "--holdout", "val.csv", "--out", "out"];
-const COLUMN: [&str; 13] = [
-    "diagnose",
-    "--simulated",
-    "s_m",
-    "--input",
-    "u_N",
-    "--output",
-    "x_m",
-    "--recording",
-    "est.csv",
-    "--holdout",
-    "val.csv",
-    "--out",
-    "out",
-];
+const COLUMN: [&str; 13] = with_files(["diagnose", "--simulated", "s_m", "--input", "u_N", "--output", "x_m"]);
 
 fn case(
     what: &'static str,
@@ -99,7 +85,7 @@ fn line(good: &[&'static str], from: &str, to: &'static str, more: &[&'static st
 }
 
 fn simulations() -> Vec<Case> {
-    let c = |what, from, to, message| case(what, simulation(from, to), &GOOD, message);
+    let c = |what, from, to, message| case(what, simulation(from, to), &DIAGNOSE, message);
     vec![
         c("not TOML", "[time]", "[time", &["base.sim.toml:3:", "not TOML"]),
         c("unknown key", "[parameters]", "[paramters]", &["base.sim.toml:7:", "paramters", "unknown key"]),
@@ -161,57 +147,64 @@ fn simulations() -> Vec<Case> {
         case(
             "a simulation that is not there",
             nothing,
-            &line(&GOOD, "base.sim.toml", "none.sim.toml", &[]),
+            &line(&DIAGNOSE, "base.sim.toml", "none.sim.toml", &[]),
             &["none.sim.toml", "no such file"],
         ),
         case(
             "a directory as simulation",
             nothing,
-            &line(&GOOD, "base.sim.toml", "folder", &[]),
+            &line(&DIAGNOSE, "base.sim.toml", "folder", &[]),
             &["folder", "directory"],
         ),
         case(
             "a recording as simulation",
             nothing,
-            &line(&GOOD, "base.sim.toml", "est.csv", &[]),
+            &line(&DIAGNOSE, "base.sim.toml", "est.csv", &[]),
             &["est.csv:1:", "not TOML"],
         ),
         case(
             "a simulation that is no text",
             |dir| std::fs::write(dir.join("base.sim.toml"), [0xFF, 0xFE, 0x00, 0x41]).unwrap(),
-            &GOOD,
+            &DIAGNOSE,
             &["base.sim.toml", "UTF-8"],
         ),
         case(
             "an empty simulation",
             |dir| std::fs::write(dir.join("base.sim.toml"), "").unwrap(),
-            &GOOD,
+            &DIAGNOSE,
             &["base.sim.toml", "missing"],
         ),
     ]
 }
 
 fn recordings() -> Vec<Case> {
-    let est =
-        |what, change: Box<dyn Fn(&str) -> String>, message| case(what, recording("est.csv", change), &GOOD, message);
-    let val =
-        |what, change: Box<dyn Fn(&str) -> String>, message| case(what, recording("val.csv", change), &GOOD, message);
+    let est = |what, change: Box<dyn Fn(&str) -> String>, message| {
+        case(what, recording("est.csv", change), &DIAGNOSE, message)
+    };
+    let val = |what, change: Box<dyn Fn(&str) -> String>, message| {
+        case(what, recording("val.csv", change), &DIAGNOSE, message)
+    };
     vec![
         case(
             "a recording that is not there",
             nothing,
-            &line(&GOOD, "est.csv", "none.csv", &[]),
+            &line(&DIAGNOSE, "est.csv", "none.csv", &[]),
             &["none.csv", "no such file"],
         ),
-        case("a directory as recording", nothing, &line(&GOOD, "est.csv", "folder", &[]), &["folder", "directory"]),
-        case("a directory as hold-out", nothing, &line(&GOOD, "val.csv", "folder", &[]), &["folder", "directory"]),
+        case("a directory as recording", nothing, &line(&DIAGNOSE, "est.csv", "folder", &[]), &["folder", "directory"]),
+        case("a directory as hold-out", nothing, &line(&DIAGNOSE, "val.csv", "folder", &[]), &["folder", "directory"]),
         case(
             "an empty recording",
             |dir| std::fs::write(dir.join("est.csv"), "").unwrap(),
-            &GOOD,
+            &DIAGNOSE,
             &["est.csv", "empty"],
         ),
-        case("an empty hold-out", |dir| std::fs::write(dir.join("val.csv"), "").unwrap(), &GOOD, &["val.csv", "empty"]),
+        case(
+            "an empty hold-out",
+            |dir| std::fs::write(dir.join("val.csv"), "").unwrap(),
+            &DIAGNOSE,
+            &["val.csv", "empty"],
+        ),
         val("a hold-out of a header only", Box::new(first(1)), &["val.csv", "not one line"]),
         est("one sample", Box::new(first(2)), &["est.csv", "samples"]),
         est("fewer samples than unknowns", Box::new(first(9)), &["est.csv", "8 usable samples"]),
@@ -246,11 +239,16 @@ fn recordings() -> Vec<Case> {
             &["est.csv", "column `x_m`", "two columns"],
         ),
         est("semicolons", Box::new(|t| t.replace(',', ";")), &["est.csv, line 1", "semicolons"]),
-        case("the same file as hold-out", nothing, &line(&GOOD, "val.csv", "est.csv", &[]), &["est.csv", "never sees"]),
+        case(
+            "the same file as hold-out",
+            nothing,
+            &line(&DIAGNOSE, "val.csv", "est.csv", &[]),
+            &["est.csv", "never sees"],
+        ),
         case(
             "a copy as hold-out",
             |dir| std::fs::copy(dir.join("est.csv"), dir.join("val.csv")).map(|_| ()).unwrap(),
-            &GOOD,
+            &DIAGNOSE,
             &["val.csv", "the same data as est.csv"],
         ),
         case(
@@ -259,15 +257,20 @@ fn recordings() -> Vec<Case> {
                 recording("est.csv", field(40, 2, ""))(dir);
                 std::fs::copy(dir.join("est.csv"), dir.join("val.csv")).unwrap();
             },
-            &GOOD,
+            &DIAGNOSE,
             &["val.csv", "the same data as est.csv"],
         ),
-        case("a recording twice", nothing, &line(&GOOD, "", "", &["--recording", "./est.csv"]), &["est.csv", "twice"]),
+        case(
+            "a recording twice",
+            nothing,
+            &line(&DIAGNOSE, "", "", &["--recording", "./est.csv"]),
+            &["est.csv", "twice"],
+        ),
     ]
 }
 
 fn requests() -> Vec<Case> {
-    let with = |what, more: &[&'static str], message| case(what, nothing, &line(&GOOD, "", "", more), message);
+    let with = |what, more: &[&'static str], message| case(what, nothing, &line(&DIAGNOSE, "", "", more), message);
     let columns = |what, from, to, message| case(what, nothing, &line(&COLUMN, from, to, &[]), message);
     vec![
         with("alpha 0", &["--alpha", "0"], &["--alpha is 0", "above 0"]),
@@ -278,17 +281,22 @@ fn requests() -> Vec<Case> {
         with("no time", &["--time-limit", "0"], &["--time-limit is 0"]),
         with("time before now", &["--time-limit=-3"], &["--time-limit is -3"]),
         with("endless time", &["--time-limit", "inf"], &["--time-limit is inf"]),
-        case("a file as --out", nothing, &line(&GOOD, "out", "notes.txt", &[]), &["--out notes.txt", "not a folder"]),
+        case(
+            "a file as --out",
+            nothing,
+            &line(&DIAGNOSE, "out", "notes.txt", &[]),
+            &["--out notes.txt", "not a folder"],
+        ),
         case(
             "a folder in a file as --out",
             nothing,
-            &line(&GOOD, "out", "notes.txt/out", &[]),
+            &line(&DIAGNOSE, "out", "notes.txt/out", &[]),
             &["--out notes.txt/out"],
         ),
         case(
             "--out where nothing may be written",
             nothing,
-            &line(&GOOD, "out", "/proc/hysid", &[]),
+            &line(&DIAGNOSE, "out", "/proc/hysid", &[]),
             &["--out /proc/hysid"],
         ),
         columns("the simulated column is not there", "s_m", "z_m", &["est.csv, column `z_m`", "`s_m`"]),
@@ -352,7 +360,7 @@ fn each_kind_of_bad_input_ends_with_one_clear_message_and_nothing_written() {
 #[test]
 fn options_that_do_not_exist_or_do_not_go_together_are_refused() {
     let dir = OscillatorFiles::write(60);
-    let with = |more: &[&'static str]| line(&GOOD, "", "", more);
+    let with = |more: &[&'static str]| line(&DIAGNOSE, "", "", more);
     let cases: Vec<(Vec<&str>, &str)> = vec![
         (with(&["--treads", "2"]), "--treads"),
         (with(&["--seed", "-1"]), "-1"),
@@ -361,7 +369,7 @@ fn options_that_do_not_exist_or_do_not_go_together_are_refused() {
         (with(&["--simulated", "s_m", "--input", "u_N", "--output", "x_m"]), "--simulated"),
         (with(&["--output", "x_m"]), "--simulated"),
         (with(&["second.sim.toml"]), "second.sim.toml"),
-        (line(&GOOD[..6], "", "", &[]), "--out"),
+        (line(&DIAGNOSE[..6], "", "", &[]), "--out"),
         (vec!["diagnose", "base.sim.toml", "--out", "out"], "--recording"),
         (vec!["diagnose", "--recording", "est.csv", "--out", "out"], "SIMULATION"),
         (vec!["diagnose", "--simulated", "s_m", "--recording", "est.csv", "--out", "out"], "--input"),

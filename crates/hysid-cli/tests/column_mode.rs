@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::{hysid, normal};
+use common::oscillator::{normal, rms};
+use common::{hysid, with_files};
 use hysid_plant::{Compiled, Drive, Run, Simulation, Start};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -66,11 +67,11 @@ impl Case {
         for (file, seed) in [("est.csv", 1), ("val.csv", 2)] {
             let u = input(seed, self.level);
             let (truth, simulated) = (simulate(self.truth, &u), simulate(self.simulator, &u));
-            let rms = (truth.iter().map(|y| y * y).sum::<f64>() / SAMPLES as f64).sqrt();
+            let noise = self.noise * rms(&truth);
             let mut random = normal(seed + 50);
             let mut text = String::from("t_s,u_V,y_mm,sim_mm\n");
             for n in 0..SAMPLES {
-                let measured = truth[n] + self.noise * rms * random();
+                let measured = truth[n] + noise * random();
                 text += &format!("{:.2},{:.8e},{measured:.8e},{:.8e}\n", n as f64 * PERIOD, u[n], simulated[n]);
             }
             std::fs::write(dir.path().join(file), text).unwrap();
@@ -80,21 +81,7 @@ impl Case {
 
     fn diagnosed(&self) -> Value {
         let dir = self.write();
-        let line = [
-            "diagnose",
-            "--simulated",
-            "sim_mm",
-            "--input",
-            "u_V",
-            "--output",
-            "y_mm",
-            "--recording",
-            "est.csv",
-            "--holdout",
-            "val.csv",
-            "--out",
-            "out",
-        ];
+        let line: [&str; 13] = with_files(["diagnose", "--simulated", "sim_mm", "--input", "u_V", "--output", "y_mm"]);
         let (status, _, stderr) = hysid(&line, dir.path());
         assert_eq!(status, 0, "{stderr}");
         let text = std::fs::read_to_string(dir.path().join("out/diagnosis.json")).unwrap();

@@ -6,7 +6,7 @@ mod common;
 use std::path::Path;
 
 use assert_cmd::Command;
-use common::{OscillatorFiles, hysid};
+use common::{DIAGNOSE, OscillatorFiles, hysid};
 use serde_json::Value;
 
 const FAMILIES: [(&str, &[&str]); 26] = [
@@ -185,8 +185,6 @@ fn complaints(d: &Value, outputs: &[&str], recordings: usize) -> Vec<String> {
     c.wrong
 }
 
-const LINE: [&str; 8] = ["diagnose", "base.sim.toml", "--recording", "est.csv", "--holdout", "val.csv", "--out", "out"];
-
 fn json(dir: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(dir.join("out/diagnosis.json")).unwrap()).unwrap()
 }
@@ -204,7 +202,7 @@ fn hardening() -> OscillatorFiles {
 #[test]
 fn a_named_effect_is_written_as_the_contract_says() {
     let files = hardening();
-    let (d, stderr) = diagnosed(&files, &LINE);
+    let (d, stderr) = diagnosed(&files, &DIAGNOSE);
     assert_eq!(complaints(&d, &["x_m"], 1), Vec::<String>::new());
     assert_eq!(d["effects"][0]["family"], "hardening_stiffness", "{d:#}");
     assert_eq!(d["effects"][0]["slot"], "state:v");
@@ -217,7 +215,7 @@ fn a_named_effect_is_written_as_the_contract_says() {
     assert_eq!(hysid(&line, files.path()).0, 0);
     std::fs::rename(files.path().join("out/augmented.sim.toml"), files.path().join("base.sim.toml")).unwrap();
     std::fs::write(files.path().join("out/augmented.sim.toml"), "stale").unwrap();
-    let (again, _) = diagnosed(&files, &LINE);
+    let (again, _) = diagnosed(&files, &DIAGNOSE);
     assert_eq!(again["verdict"], "no_significant_mismatch", "{again:#}");
     assert!(!files.path().join("out/augmented.sim.toml").exists());
     // The black box is no better than the simulation with the effect, and near it: both see the same data.
@@ -231,7 +229,7 @@ fn a_named_effect_is_written_as_the_contract_says() {
 #[test]
 fn no_mismatch_is_written_as_the_contract_says() {
     let files = OscillatorFiles::write(500);
-    let (d, _) = diagnosed(&files, &LINE);
+    let (d, _) = diagnosed(&files, &DIAGNOSE);
     assert_eq!(complaints(&d, &["x_m"], 1), Vec::<String>::new());
     assert_eq!(d["verdict"], "no_significant_mismatch");
     assert!(d["mismatch"]["detectable"].as_array().unwrap().len() > 10);
@@ -258,21 +256,21 @@ fn the_same_bytes_for_any_number_of_threads() {
         [(Some("1"), None), (None, Some("1")), (None, Some("2")), (None, Some("4")), (Some("3"), None)]
     {
         let mut command = Command::cargo_bin("hysid").unwrap();
-        command.current_dir(files.path()).args(LINE).env_remove("RAYON_NUM_THREADS");
+        command.current_dir(files.path()).args(DIAGNOSE).env_remove("RAYON_NUM_THREADS");
         command.args(flag.iter().flat_map(|n| ["--threads", n])).envs(variable.map(|n| ("RAYON_NUM_THREADS", n)));
         command.assert().success();
         all.push(std::fs::read(files.path().join("out/diagnosis.json")).unwrap());
     }
     assert!(all.iter().all(|bytes| *bytes == all[0]));
     // Another seed is another run.
-    let (d, _) = diagnosed(&files, &[&LINE[..], &["--seed", "2"]].concat());
+    let (d, _) = diagnosed(&files, &[&DIAGNOSE[..], &["--seed", "2"]].concat());
     assert_eq!(d["seed"], 2);
 }
 
 #[test]
 fn a_time_limit_leaves_out_steps_and_says_so() {
     let files = hardening();
-    let (d, _) = diagnosed(&files, &[&LINE[..], &["--time-limit", "0.001"]].concat());
+    let (d, _) = diagnosed(&files, &[&DIAGNOSE[..], &["--time-limit", "0.001"]].concat());
     assert_eq!(complaints(&d, &["x_m"], 1), Vec::<String>::new());
     assert_ne!(d["verdict"], "no_significant_mismatch");
     assert!(
@@ -281,6 +279,6 @@ fn a_time_limit_leaves_out_steps_and_says_so() {
         d["notes"]
     );
     assert!(d["fit"][0]["rmse_before"].is_number() && d["fit"][0]["rmse_black_box"].is_null(), "{}", d["fit"]);
-    let (d, _) = diagnosed(&files, &[&LINE[..], &["--time-limit", "600"]].concat());
+    let (d, _) = diagnosed(&files, &[&DIAGNOSE[..], &["--time-limit", "600"]].concat());
     assert!(!d["notes"].to_string().contains("time limit"), "{}", d["notes"]);
 }

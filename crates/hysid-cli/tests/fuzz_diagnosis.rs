@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{BASELINE, OscillatorFiles, hysid};
+use common::oscillator::BASELINE;
+use common::{FILES, OscillatorFiles, hysid};
 use proptest::prelude::*;
 
 /// One damage to a text.
@@ -182,18 +183,8 @@ fn ends_well(dir: &std::path::Path, mode: Mode) -> Result<(), TestCaseError> {
         Mode::Column => vec!["diagnose", "--simulated", "s_m", "--input", "u_N", "--output", "x_m"],
         Mode::File => vec!["diagnose", "base.sim.toml"],
     };
-    line.extend([
-        "--recording",
-        "est.csv",
-        "--holdout",
-        "val.csv",
-        "--out",
-        "out",
-        "--threads",
-        "1",
-        "--time-limit",
-        "0.01",
-    ]);
+    line.extend(FILES);
+    line.extend(["--threads", "1", "--time-limit", "0.01"]);
     let (status, _, stderr) = hysid(&line, dir);
     prop_assert!(!stderr.contains("panicked"), "{stderr}");
     prop_assert!(status == 0 || status == 2, "{status}: {stderr}");

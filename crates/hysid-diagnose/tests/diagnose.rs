@@ -1,66 +1,22 @@
-//! Whole diagnoses of an oscillator whose recordings come from a small integrator of this file's own, and bad input.
+//! Whole diagnoses of an oscillator whose recordings come from a small integrator of the tests' own, and bad input.
+
+#[path = "common/oscillator.rs"]
+mod oscillator;
 
 use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose};
 use hysid_plant::Simulation;
 use hysid_signal::{Channel, Clock, Recording};
-
-const BASELINE: &str = r#"
-title = "Oscillator"
-[time]
-column = "t_s"
-[inputs]
-u = "u_N"
-[parameters]
-m = { value = 1.2, min = 0.2, max = 5.0, unit = "kg" }
-c = { value = 0.7, min = 0.0, max = 20.0, unit = "N s/m" }
-k = { value = 130.0, min = 10.0, max = 1000.0, unit = "N/m" }
-[states]
-x = { derivative = "v", initial = 0.0, unit = "m" }
-v = { derivative = "(u - c*v - k*x)/m", initial = 0.0, unit = "m/s" }
-[outputs]
-x_m = "x"
-"#;
-
-/// A linear congruential stream of roughly normal numbers.
-fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut s = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        (0..12)
-            .map(|_| {
-                s = s.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (s >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            })
-            .sum()
-    }
-}
+use oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
 
 fn recording(name: &str, seed: u64, n: usize, force: impl Fn(f64, f64) -> f64) -> Recording {
-    let h = 0.025;
-    let mut random = noise(seed);
-    let phases: Vec<f64> = (0..40).map(|_| 3.0 * random()).collect();
-    let u: Vec<f64> = (0..n)
-        .map(|i| {
-            let t = i as f64 * h;
-            let level = if (t / 6.0) as usize % 2 == 0 { 2.0 } else { 1.0 };
-            level * phases.iter().enumerate().map(|(j, p)| (0.6 * (j + 1) as f64 * t + p).cos()).sum::<f64>()
-        })
-        .collect();
-    let (mut x, mut v) = (0.0, 0.0);
-    let mut y = Vec::new();
-    for i in 0..n {
-        y.push(x);
-        let (a, b) = (u[i], u[(i + 1).min(n - 1)]);
-        for s in 0..40 {
-            let f = a + (b - a) * f64::from(s) / 40.0;
-            v += h / 40.0 * (f - 0.9 * v - 158.0 * x - force(x, v));
-            x += h / 40.0 * v;
-        }
-    }
-    let rms = (y.iter().map(|y| y * y).sum::<f64>() / n as f64).sqrt();
-    y.iter_mut().for_each(|y| *y += 0.02 * rms * random());
+    let mut random = normal(seed);
+    let u = drive(n, &mut random);
+    let mut y = respond(&u, REAL, force);
+    let noise = 0.02 * rms(&y);
+    y.iter_mut().for_each(|y| *y += noise * random());
     let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-    Recording::new(name, Clock { start_s: 0.0, period_s: h }, channels).unwrap()
+    Recording::new(name, Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap()
 }
 
 fn run(text: &str, estimation: &[Recording], holdout: &[Recording]) -> Result<Diagnosis, DiagnoseError> {

@@ -1,7 +1,10 @@
 //! Estimation against known truth: refinement, growth, extended least squares, resting points.
 
+mod common;
+
+use common::coefficients;
 use hysid_dictionary::{Record, Signals, Term};
-use hysid_narx::{Coefficient, Evaluate, Fit, NarxModel, Parts, Refine, Trainer, Window};
+use hysid_narx::{Evaluate, Fit, NarxModel, Parts, Refine, Trainer, Window};
 
 fn noise(n: usize, seed: u64) -> Vec<f64> {
     let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
@@ -123,15 +126,7 @@ fn extended_least_squares_finds_the_colour_of_the_noise() {
 
 fn model(texts: &[(&str, f64)]) -> NarxModel {
     let signals = Signals::siso();
-    let coefficients = texts
-        .iter()
-        .map(|(t, c)| Coefficient {
-            term: signals.parse(t).unwrap(),
-            theta: *c,
-            standard_error: f64::NAN,
-            err: f64::NAN,
-        })
-        .collect();
+    let coefficients = coefficients(&signals, texts, f64::NAN);
     let (derived, noise) = (vec![], vec![]);
     NarxModel::new(Parts { signals, derived, coefficients, noise, limit: 10.0, period_s: None, decimation: 1 }).unwrap()
 }

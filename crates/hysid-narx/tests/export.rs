@@ -1,9 +1,12 @@
 //! Exported code gives the model's own free run.
 
+mod common;
+
 use std::process::Command;
 
+use common::coefficients;
 use hysid_dictionary::{Record, SignalName, Signals};
-use hysid_narx::{Coefficient, Derived, Law, NarxModel, Parts, Past};
+use hysid_narx::{Derived, Law, NarxModel, Parts, Past};
 
 fn model() -> NarxModel {
     let derived = vec![
@@ -28,15 +31,7 @@ fn model() -> NarxModel {
         ("w4[n]", 0.7),
         ("du[n-1]^3", 1e-3),
     ];
-    let coefficients = terms
-        .iter()
-        .map(|(t, c)| Coefficient {
-            term: signals.parse(t).unwrap(),
-            theta: *c,
-            standard_error: f64::NAN,
-            err: f64::NAN,
-        })
-        .collect();
+    let coefficients = coefficients(&signals, &terms, f64::NAN);
     NarxModel::new(Parts { signals, derived, coefficients, noise: vec![], limit: 1e3, period_s: None, decimation: 1 })
         .unwrap()
 }

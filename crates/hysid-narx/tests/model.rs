@@ -1,7 +1,10 @@
 //! The model against hand computation, the dictionary's own evaluator, and its file.
 
+mod common;
+
+use common::coefficients;
 use hysid_dictionary::{Model, Record, Signal, SignalName, Signals};
-use hysid_narx::{Coefficient, Derived, Law, NarxModel, NoiseTerm, Parts, Past};
+use hysid_narx::{Derived, Law, NarxModel, NoiseTerm, Parts, Past};
 use proptest::prelude::*;
 
 fn parts(terms: &[(&str, f64)], derived: Vec<Derived>) -> Parts {
@@ -9,10 +12,7 @@ fn parts(terms: &[(&str, f64)], derived: Vec<Derived>) -> Parts {
     let mut inputs = vec![name("u", "u_V")];
     inputs.extend(derived.iter().map(|d| name(&d.symbol, &d.symbol)));
     let signals = Signals::new(name("y", "y_mm"), inputs).unwrap();
-    let coefficients = terms
-        .iter()
-        .map(|(t, c)| Coefficient { term: signals.parse(t).unwrap(), theta: *c, standard_error: 0.1, err: f64::NAN })
-        .collect();
+    let coefficients = coefficients(&signals, terms, 0.1);
     Parts { signals, derived, coefficients, noise: vec![], limit: 100.0, period_s: Some(0.01), decimation: 1 }
 }
 

@@ -9,23 +9,28 @@ use std::path::Path;
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-/// A simulation of the oscillator with parameters that are somewhat wrong.
-pub const BASELINE: &str = r#"
-title = "Oscillator"
-[time]
-column = "t_s"
-[inputs]
-u = "u_N"
-[parameters]
-m = { value = 1.2, min = 0.2, max = 5.0, unit = "kg" }
-c = { value = 0.7, min = 0.0, max = 20.0, unit = "N s/m" }
-k = { value = 130.0, min = 10.0, max = 1000.0, unit = "N/m" }
-[states]
-x = { derivative = "v", initial = 0.0, unit = "m" }
-v = { derivative = "(u - c*v - k*x)/m", initial = 0.0, unit = "m/s" }
-[outputs]
-x_m = "x"
-"#;
+#[path = "../../../hysid-diagnose/tests/common/oscillator.rs"]
+pub mod oscillator;
+
+use oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+
+/// The part of a command line of `hysid diagnose` that names the recordings and the output folder, as every test calls them.
+pub const FILES: [&str; 6] = ["--recording", "est.csv", "--holdout", "val.csv", "--out", "out"];
+
+/// A command line that ends with [`FILES`].
+pub const fn with_files<const HEAD: usize, const ALL: usize>(head: [&'static str; HEAD]) -> [&'static str; ALL] {
+    assert!(ALL == HEAD + FILES.len());
+    let mut line = [""; ALL];
+    let mut i = 0;
+    while i < ALL {
+        line[i] = if i < HEAD { head[i] } else { FILES[i - HEAD] };
+        i += 1;
+    }
+    line
+}
+
+/// The diagnosis of the good files of [`OscillatorFiles`].
+pub const DIAGNOSE: [&str; 8] = with_files(["diagnose", "base.sim.toml"]);
 
 /// Runs the program; returns status, stdout and stderr.
 pub fn hysid(args: &[&str], dir: &Path) -> (i32, String, String) {
@@ -48,19 +53,6 @@ pub fn files_of(dir: &Path) -> BTreeMap<String, Vec<u8>> {
         }
     }
     out
-}
-
-/// A linear congruential stream of roughly normal numbers.
-pub fn normal(seed: u64) -> impl FnMut() -> f64 {
-    let mut s = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        (0..12)
-            .map(|_| {
-                s = s.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (s >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            })
-            .sum()
-    }
 }
 
 /// A folder with `base.sim.toml`, `est.csv` and `val.csv`, columns `t_s,u_N,x_m,s_m`: an oscillator with a little noise, and what a
@@ -89,46 +81,15 @@ impl OscillatorFiles {
     }
 }
 
-/// The period of the recordings.
-const PERIOD: f64 = 0.025;
-
-/// Many sines, loud and quiet by turns.
-pub fn drive(samples: usize, seed: u64) -> Vec<f64> {
-    let mut random = normal(seed);
-    let phases: Vec<f64> = (0..40).map(|_| 3.0 * random()).collect();
-    (0..samples)
-        .map(|i| {
-            let t = i as f64 * PERIOD;
-            let level = if (t / 6.0) as usize % 2 == 0 { 2.0 } else { 1.0 };
-            level * phases.iter().enumerate().map(|(j, p)| (0.6 * (j + 1) as f64 * t + p).cos()).sum::<f64>()
-        })
-        .collect()
-}
-
 fn recording(samples: usize, seed: u64, force: &impl Fn(f64, f64) -> f64) -> String {
-    let u = drive(samples, seed);
-    let respond = |m: f64, c: f64, k: f64, force: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
-        let (mut x, mut v) = (0.0, 0.0);
-        (0..samples)
-            .map(|i| {
-                let here = x;
-                let (a, b) = (u[i], u[(i + 1).min(samples - 1)]);
-                for s in 0..40 {
-                    let f = a + (b - a) * f64::from(s) / 40.0;
-                    v += PERIOD / 40.0 * (f - c * v - k * x - force(x, v)) / m;
-                    x += PERIOD / 40.0 * v;
-                }
-                here
-            })
-            .collect()
-    };
-    let real = respond(1.0, 0.9, 158.0, force);
-    let simulated = respond(1.2, 0.7, 130.0, &|_, _| 0.0);
-    let rms = (real.iter().map(|y| y * y).sum::<f64>() / samples.max(1) as f64).sqrt();
+    let u = drive(samples, &mut normal(seed));
+    let real = respond(&u, REAL, force);
+    let simulated = respond(&u, (1.2, 0.7, 130.0), |_, _| 0.0);
+    let noise = 0.02 * rms(&real);
     let mut random = normal(seed + 100);
     let mut text = String::from("t_s,u_N,x_m,s_m\n");
     for i in 0..samples {
-        let measured = real[i] + 0.02 * rms * random();
+        let measured = real[i] + noise * random();
         text += &format!(
             "{},{:.9e},{:.9e},{:.9e}\n",
             (i as f64 * PERIOD * 1e6).round() / 1e6,
