@@ -1,25 +1,23 @@
 //! From a table of subsets to the result: refit from the samples, choose the size, order the terms, check the arithmetic.
 
-use hysid_linalg::Columns;
-
 use crate::criterion::choose;
-use crate::forward::Factor;
+use crate::evidence::Evidence;
+use crate::forward::{Factor, NOISE};
 use crate::moments::Moments;
-use crate::refit::{Goal, Refit, refit};
+use crate::refit::{Goal, Refit};
 use crate::search::Table;
 use crate::{Criterion, CurvePoint, Options, Precision, Search, Selection, Step, StopReason};
 
 /// Deviation of the search's error reduction ratios from those of the QR, beyond which they count as doubtful.
 const DEVIATION: f64 = 1e-3;
 
-pub(crate) fn finish<C: Columns + ?Sized>(
-    phi: &C,
-    y: &[f64],
+pub(crate) fn finish<E: Evidence + ?Sized>(
     options: &Options,
-    moments: &mut Moments<'_, C>,
+    moments: &mut Moments<'_, E>,
     mut table: Table,
 ) -> Selection {
-    let (samples, energy) = (phi.rows(), moments.target_energy);
+    let (evidence, energy) = (moments.evidence, moments.target_energy);
+    let samples = evidence.samples();
     let goal = Goal::of(&options.criterion);
     let pursuit = options.search == Search::MatchingPursuit;
     let mut curve: Vec<CurvePoint> = Vec::with_capacity(table.best.len());
@@ -31,7 +29,7 @@ pub(crate) fn finish<C: Columns + ?Sized>(
         let (order, shortest) = chain(&table, chain_end);
         let fit = match table.refit.take_if(|(columns, _)| *columns == order) {
             Some((_, fit)) => fit,
-            None => refit(phi, y, &order, energy, goal.clone()),
+            None => evidence.refit(&order, energy, goal.clone()),
         };
         for k in (shortest..=chain_end).rev() {
             let search_sse = table.best[k - 1].sse.max(0.0);
@@ -72,7 +70,7 @@ pub(crate) fn finish<C: Columns + ?Sized>(
     let terms = if pursuit { subset.to_vec() } else { in_order(moments, options, subset) };
     let fit = match chains.into_iter().find(|(order, _)| order.starts_with(&terms)) {
         Some((_, fit)) => fit,
-        None => refit(phi, y, &terms, energy, goal),
+        None => evidence.refit(&terms, energy, goal),
     };
     let solution = fit.solution(size);
     let (err_deviation, smallest_pivot, first_bad) = check(moments, &terms, &fit);
@@ -121,7 +119,7 @@ fn chain(table: &Table, longest: usize) -> (Vec<usize>, usize) {
 }
 
 /// The subset in the order in which forward regression takes it, the forced columns first.
-fn in_order<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, options: &Options, subset: &[usize]) -> Vec<usize> {
+fn in_order<E: Evidence + ?Sized>(moments: &mut Moments<'_, E>, options: &Options, subset: &[usize]) -> Vec<usize> {
     let guard = options.pivot_guard;
     let mut factor = Factor::new(moments);
     while factor.chosen.len() < subset.len() {
@@ -145,14 +143,24 @@ fn in_order<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, options: &Options
     factor.chosen
 }
 
-/// Compares the error reduction ratios on inner products with those of the QR.
-fn check<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, terms: &[usize], fit: &Refit) -> (f64, f64, Option<usize>) {
+/// Compares the error reduction ratios on inner products with those of the QR; without samples to factor, with what rounding may do.
+fn check<E: Evidence + ?Sized>(
+    moments: &mut Moments<'_, E>,
+    terms: &[usize],
+    fit: &Refit,
+) -> (f64, f64, Option<usize>) {
     let factor = Factor::of(moments, terms, 0.0);
     let (mut worst, mut pivot, mut first_bad) = (0.0f64, 1.0f64, None);
     for k in 0..factor.chosen.len().min(fit.err.len()) {
         let (a, b) = (factor.err(k), fit.err[k]);
         // Below the rounding of inner products the two cannot agree, and need not.
-        let deviation = if a.max(b) > 1e-24 { (a - b).abs() / a.max(b) } else { 0.0 };
+        let deviation = if !fit.from_samples {
+            2.0 * NOISE / factor.gain[k].abs() / factor.pivot(k).sqrt() + NOISE / factor.pivot(k)
+        } else if a.max(b) > 1e-24 {
+            (a - b).abs() / a.max(b)
+        } else {
+            0.0
+        };
         worst = worst.max(deviation);
         pivot = pivot.min(factor.pivot(k));
         if deviation > DEVIATION && first_bad.is_none() {

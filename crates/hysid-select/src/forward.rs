@@ -4,8 +4,7 @@
 //! target; its error reduction ratio is c_j^2 / S_j. Choosing a column subtracts its row of the factor from both; giving
 //! one back rotates its direction into the last row (Givens) and adds that row again.
 
-use hysid_linalg::Columns;
-
+use crate::evidence::Evidence;
 use crate::moments::Moments;
 
 /// An inner product of unit vectors below this is rounding.
@@ -35,14 +34,14 @@ pub(crate) struct Member {
 }
 
 impl Factor {
-    pub fn new<C: Columns + ?Sized>(moments: &Moments<'_, C>) -> Self {
+    pub fn new<E: Evidence + ?Sized>(moments: &Moments<'_, E>) -> Self {
         let energy = (0..moments.len()).map(|j| if moments.is_zero(j) { 0.0 } else { 1.0 }).collect();
         let cross = moments.cross.clone();
         Self { chosen: Vec::new(), gain: Vec::new(), rows: Vec::new(), energy, cross }
     }
 
     /// The factor of these columns in this order, leaving out what the guard does not let in.
-    pub fn of<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, columns: &[usize], guard: f64) -> Self {
+    pub fn of<E: Evidence + ?Sized>(moments: &mut Moments<'_, E>, columns: &[usize], guard: f64) -> Self {
         let mut factor = Self::new(moments);
         for (i, &j) in columns.iter().enumerate() {
             if factor.energy[j] > guard {

@@ -24,6 +24,8 @@
 //! assert_eq!(terms, [0, 2]);
 //! ```
 //!
+//! [`select_gram`] does the same from a Gram matrix, when the samples are gone.
+//!
 //! # Conventions
 //!
 //! Energies are relative to y'y. A column counts with unit length, so that scaling the columns changes nothing. All sums
@@ -36,6 +38,7 @@
 //! forward regression and the PRESS statistic"; Zhang, Zhu, Gu (2017), whose equations are cited by their numbers.
 
 mod criterion;
+mod evidence;
 mod finish;
 mod forward;
 mod moments;
@@ -49,7 +52,8 @@ mod search;
 pub use options::{Criterion, Options, PressForm, Search, SelectError};
 pub use result::{CurvePoint, Precision, Rejected, RejectedReason, Selection, Step, StopReason};
 
-use hysid_linalg::Columns;
+use evidence::{Evidence, Samples};
+use hysid_linalg::{Columns, Gram};
 
 /// The columns of `phi` that explain `y`, found as `options` say.
 ///
@@ -57,14 +61,36 @@ use hysid_linalg::Columns;
 /// A target of another length than `phi` has rows, or all zero, or not finite; options out of range.
 pub fn select<C: Columns + ?Sized>(phi: &C, y: &[f64], options: &Options) -> Result<Selection, SelectError> {
     options.check(phi.rows(), phi.cols(), y)?;
-    let mut moments = moments::Moments::new(phi, y)?;
+    find(&Samples { phi, y }, options)
+}
+
+/// The columns that explain the target, found from inner products alone: for data that do not fit into memory.
+///
+/// It is the search of [`select`]; what [`select`] takes from the samples is taken from the Gram matrix here, with these consequences:
+///
+/// - Coefficients lose twice the digits that the condition of the chosen columns costs ([`Step::condition`]).
+/// - Near-ties are not decided from the samples: the better by inner products is taken, and [`Precision::doubtful_from`] says so.
+///   [`Precision::err_deviation`] is a bound for what rounding may have done to an error reduction ratio.
+/// - In place of the exact PRESS stands SSE / (1 - n/N)^2, from which it differs by a part of the order of n/N.
+/// - Residuals below 1e-14 of y'y are rounding, and are reported as that.
+///
+/// # Errors
+/// A matrix, products and target that do not fit each other; a target that is zero; values that are not finite; options out of range;
+/// [`Criterion::Blocks`], which needs the samples.
+pub fn select_gram(gram: &Gram, options: &Options) -> Result<Selection, SelectError> {
+    options.check_gram(gram)?;
+    find(gram, options)
+}
+
+fn find<E: Evidence>(evidence: &E, options: &Options) -> Result<Selection, SelectError> {
+    let mut moments = moments::Moments::new(evidence)?;
     let table = match options.search {
         Search::MatchingPursuit => {
             // A pursuit does not solve for its coefficients, so it may take more terms than there are samples.
-            let longest = options::longest(options, usize::MAX, phi.cols());
+            let longest = options::longest(options, usize::MAX, evidence.candidates());
             search::Table::of_pursuit(pursuit::pursue(&mut moments, &options.forced, longest), longest)
         }
-        _ => search::search(phi, y, &mut moments, options),
+        _ => search::search(&mut moments, options),
     };
-    Ok(finish::finish(phi, y, options, &mut moments, table))
+    Ok(finish::finish(options, &mut moments, table))
 }

@@ -4,9 +4,8 @@
 
 use std::collections::HashMap;
 
-use hysid_linalg::Columns;
-
 use crate::SelectError;
+use crate::evidence::Evidence;
 
 /// How many columns of the Gram matrix one pass over the samples makes at most: on short data a pass costs more than its
 /// columns, on long data a column that is not needed costs more than a pass.
@@ -15,8 +14,8 @@ const PER_PASS: (usize, usize) = (8, 2);
 const LONG: usize = 1_000_000;
 
 /// The inner products of unit columns with each other and with the unit target.
-pub(crate) struct Moments<'a, C: ?Sized> {
-    phi: &'a C,
+pub(crate) struct Moments<'a, E: ?Sized> {
+    pub evidence: &'a E,
     /// 1 / norm of each column; 0 for a column of zeros.
     scale: Vec<f64>,
     /// Inner product of each unit column with the unit target.
@@ -26,16 +25,16 @@ pub(crate) struct Moments<'a, C: ?Sized> {
     gram: HashMap<usize, Vec<f64>>,
 }
 
-impl<'a, C: Columns + ?Sized> Moments<'a, C> {
-    pub fn new(phi: &'a C, y: &[f64]) -> Result<Self, SelectError> {
-        let start = phi.start(y);
+impl<'a, E: Evidence + ?Sized> Moments<'a, E> {
+    pub fn new(evidence: &'a E) -> Result<Self, SelectError> {
+        let start = evidence.start();
         if let Some(j) = start.norms.iter().zip(&start.cross).position(|(n, c)| !n.is_finite() || !c.is_finite()) {
             return Err(SelectError::NotFinite(format!("column {j}")));
         }
         let scale: Vec<f64> = start.norms.iter().map(|n| if *n > 0.0 { 1.0 / n.sqrt() } else { 0.0 }).collect();
         let target = start.target.sqrt();
         let cross = start.cross.iter().zip(&scale).map(|(c, s)| c * s / target).collect();
-        Ok(Self { phi, scale, cross, target_energy: start.target, gram: HashMap::new() })
+        Ok(Self { evidence, scale, cross, target_energy: start.target, gram: HashMap::new() })
     }
 
     pub fn len(&self) -> usize {
@@ -56,10 +55,10 @@ impl<'a, C: Columns + ?Sized> Moments<'a, C> {
             return;
         }
         let mut which = vec![j];
-        let long = self.phi.rows().saturating_mul(self.phi.cols()) >= LONG;
+        let long = self.evidence.samples().saturating_mul(self.evidence.candidates()) >= LONG;
         let most = if long { PER_PASS.1 } else { PER_PASS.0 };
         which.extend(likely.into_iter().filter(|k| *k != j && !self.has(*k)).take(most - 1));
-        let columns = self.phi.gram_columns(&which);
+        let columns = self.evidence.gram_columns(&which);
         for (c, &k) in which.iter().enumerate() {
             let column = columns.col(c).iter().zip(&self.scale).map(|(g, s)| g * s * self.scale[k]).collect();
             self.gram.insert(k, column);

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use hysid_linalg::Gram;
+
 /// How subsets of columns are looked for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Search {
@@ -171,6 +173,34 @@ impl Options {
         if y.iter().all(|v| *v == 0.0) {
             return Err(SelectError::ZeroTarget);
         }
+        self.check_options(rows, cols)
+    }
+
+    /// The same for a selection from inner products.
+    pub(crate) fn check_gram(&self, gram: &Gram) -> Result<(), SelectError> {
+        let (rows, cols) = (gram.rows, gram.matrix.cols());
+        for found in [gram.cross.len(), gram.matrix.rows()] {
+            if found != cols {
+                return Err(SelectError::Shape { rows: cols, found });
+            }
+        }
+        if rows == 0 || cols == 0 {
+            return Err(SelectError::Empty { rows, cols });
+        }
+        if !gram.target.is_finite() || gram.target < 0.0 {
+            return Err(SelectError::NotFinite("the target".into()));
+        }
+        if gram.target == 0.0 {
+            return Err(SelectError::ZeroTarget);
+        }
+        if let Criterion::Blocks(_) = self.criterion {
+            let (given, allowed) = ("left-out blocks".into(), "a criterion that needs no samples".into());
+            return Err(SelectError::Option { option: "criterion", given, allowed });
+        }
+        self.check_options(rows, cols)
+    }
+
+    fn check_options(&self, rows: usize, cols: usize) -> Result<(), SelectError> {
         let option =
             |option, given: String, allowed: &str| Err(SelectError::Option { option, given, allowed: allowed.into() });
         if self.max_terms == 0 {

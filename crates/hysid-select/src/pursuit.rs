@@ -3,8 +3,7 @@
 //! The residual r loses the best raw column's own projection, r - (r'phi_j / phi_j'phi_j) phi_j; columns are neither
 //! orthogonalised nor are coefficients refitted inside the loop. A column is taken once.
 
-use hysid_linalg::Columns;
-
+use crate::evidence::Evidence;
 use crate::forward::NOISE;
 use crate::moments::Moments;
 
@@ -15,7 +14,7 @@ pub(crate) struct Pursuit {
     pub sse: Vec<f64>,
 }
 
-pub(crate) fn pursue<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, forced: &[usize], longest: usize) -> Pursuit {
+pub(crate) fn pursue<E: Evidence + ?Sized>(moments: &mut Moments<'_, E>, forced: &[usize], longest: usize) -> Pursuit {
     let mut cross = moments.cross.clone();
     let mut path = Pursuit { columns: Vec::new(), sse: Vec::new() };
     let mut left = 1.0;

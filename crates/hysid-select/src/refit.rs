@@ -7,13 +7,14 @@
 use std::ops::Range;
 
 use hysid_linalg::{
-    Columns, Lstsq, Matrix, TallQr, dot, leave_one_out_sum, lstsq, solve_factor, subtract_multiple, sum_over_blocks,
-    take_out,
+    Columns, Gram, Lstsq, Matrix, TallQr, dot, leave_one_out_sum, lstsq, solve_factor, subtract_multiple,
+    sum_over_blocks, take_out,
 };
 use rayon::prelude::*;
 
 use crate::Criterion;
 use crate::criterion::{Facts, value};
+use crate::search::EXACT;
 
 /// What the samples say of a path of columns; entry k - 1 is for the first k columns.
 #[derive(Debug, Clone)]
@@ -28,6 +29,8 @@ pub(crate) struct Refit {
     candidates: usize,
     /// R of the columns and the target, column-major.
     factor: Vec<f64>,
+    /// Whether it comes from the samples, not from inner products.
+    pub from_samples: bool,
 }
 
 /// What a refit is to find out beside the residuals.
@@ -85,10 +88,46 @@ const SERIAL_BELOW: usize = 8_000_000;
 /// A leverage this close to 1 leaves nothing to leave out.
 const FULL_LEVERAGE: f64 = 1e-10;
 
-pub(crate) fn refit<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize], energy: f64, goal: Goal) -> Refit {
+/// From the samples, in two passes.
+pub(crate) fn from_samples<C: Columns + ?Sized>(
+    phi: &C,
+    y: &[f64],
+    columns: &[usize],
+    energy: f64,
+    goal: Goal,
+) -> Refit {
     let (n, rows) = (columns.len(), phi.rows());
-    let w = n + 1;
     let r = factor(phi, y, columns);
+    let press = sum_over_blocks(rows, n, rows * n * n, |range, sums| {
+        rotate(phi, y, columns, &r, range, |k, _, e, free| {
+            sums[k] = leave_one_out_sum(e, free, FULL_LEVERAGE);
+        });
+    });
+    let press = press.iter().map(|p| p / energy).collect();
+    let blocks = match goal {
+        Goal::Samples => vec![f64::NAN; n],
+        Goal::Blocks(blocks) => left_out_blocks(phi, y, columns, &r, &blocks).iter().map(|b| b / energy).collect(),
+    };
+    let (err, sse, condition) = path(&r, n, energy);
+    Refit { err, sse, press, blocks, condition, candidates: phi.cols(), factor: r, from_samples: true }
+}
+
+/// From inner products alone: the Cholesky factor in place of the QR, and equation (18) with its square in place of the exact
+/// leave-one-out sum, SSE / (1 - n/N)^2. The two differ by what leverages differ among samples, of the order of n/N.
+pub(crate) fn from_gram(gram: &Gram, columns: &[usize], energy: f64) -> Refit {
+    let n = columns.len();
+    let r = cholesky(gram, columns);
+    let (err, mut sse, condition) = path(&r, n, energy);
+    sse.iter_mut().for_each(|s| *s = s.max(EXACT));
+    let share = |k: usize| 1.0 - (k + 1) as f64 / gram.rows as f64;
+    let press = sse.iter().enumerate().map(|(k, s)| s / share(k).max(FULL_LEVERAGE).powi(2)).collect();
+    let (candidates, blocks) = (gram.matrix.cols(), vec![f64::NAN; n]);
+    Refit { err, sse, press, blocks, condition, candidates, factor: r, from_samples: false }
+}
+
+/// Error reduction ratios, what is left of the target, and the condition, for every length of the path that R factors.
+fn path(r: &[f64], n: usize, energy: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let w = n + 1;
     let norm = |j: usize| (0..=j).map(|i| r[j * w + i].powi(2)).sum::<f64>().sqrt();
     let mut err = Vec::with_capacity(n);
     let mut condition = Vec::with_capacity(n);
@@ -107,17 +146,7 @@ pub(crate) fn refit<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize], 
         sse[k] = tail;
         tail += err[k];
     }
-    let press = sum_over_blocks(rows, n, rows * n * n, |range, sums| {
-        rotate(phi, y, columns, &r, range, |k, _, e, free| {
-            sums[k] = leave_one_out_sum(e, free, FULL_LEVERAGE);
-        });
-    });
-    let press = press.iter().map(|p| p / energy).collect();
-    let blocks = match goal {
-        Goal::Samples => vec![f64::NAN; n],
-        Goal::Blocks(blocks) => left_out_blocks(phi, y, columns, &r, &blocks).iter().map(|b| b / energy).collect(),
-    };
-    Refit { err, sse, press, blocks, condition, candidates: phi.cols(), factor: r }
+    (err, sse, condition)
 }
 
 /// Rows of Q, and with them the residual and 1 - h of every sample, for the first 1, 2, ... columns.
@@ -235,4 +264,26 @@ pub(crate) fn factor<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize])
         whole.merge(&part);
     }
     whole.into_factor()
+}
+
+/// The factor R of `[columns y]` from their inner products, column-major. A column that is a combination of those before it, as far as
+/// inner products can tell, gets the pivot 0.
+fn cholesky(gram: &Gram, columns: &[usize]) -> Vec<f64> {
+    let (n, w) = (columns.len(), columns.len() + 1);
+    let entry = |i: usize, j: usize| match (i == n, j == n) {
+        (false, false) => gram.matrix.get(columns[i], columns[j]),
+        (false, true) => gram.cross[columns[i]],
+        _ => gram.target,
+    };
+    let mut r = vec![0.0; w * w];
+    for j in 0..w {
+        for i in 0..j {
+            let known: f64 = (0..i).map(|k| r[i * w + k] * r[j * w + k]).sum();
+            let pivot = r[i * w + i];
+            r[j * w + i] = if pivot > 0.0 { (entry(i, j) - known) / pivot } else { 0.0 };
+        }
+        let known: f64 = (0..j).map(|k| r[j * w + k] * r[j * w + k]).sum();
+        r[j * w + j] = (entry(j, j) - known).max(0.0).sqrt();
+    }
+    r
 }

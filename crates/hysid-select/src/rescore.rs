@@ -1,10 +1,8 @@
 //! Near-ties decided from the samples: the short list orthogonalised by Householder QR, whose errors grow with the
 //! condition and not with its square.
 
-use hysid_linalg::Columns;
-
+use crate::evidence::Evidence;
 use crate::forward::{Factor, NOISE};
-use crate::refit::factor as qr_factor;
 
 /// Which candidate to take.
 pub(crate) struct Choice {
@@ -19,13 +17,7 @@ fn uncertainty(factor: &Factor, j: usize) -> f64 {
 }
 
 /// The best of `ranked` (best first): by the inner products when they decide, from the samples when they do not.
-pub(crate) fn choose_next<C: Columns + ?Sized>(
-    phi: &C,
-    y: &[f64],
-    factor: &Factor,
-    ranked: &[usize],
-    guard: f64,
-) -> Choice {
+pub(crate) fn choose_next<E: Evidence + ?Sized>(evidence: &E, factor: &Factor, ranked: &[usize], guard: f64) -> Choice {
     let score = |j: usize| factor.score(j, guard).unwrap_or(0.0);
     let first = ranked[0];
     let lower = score(first) * (1.0 - uncertainty(factor, first));
@@ -39,7 +31,7 @@ pub(crate) fn choose_next<C: Columns + ?Sized>(
     let mut columns = factor.chosen.clone();
     columns.extend(&rivals);
     let w = columns.len() + 1;
-    let r = qr_factor(phi, y, &columns);
+    let Some(r) = evidence.factor(&columns) else { return Choice { column: first, doubtful: true } };
     let left = |c: usize| &r[c * w + k..(c + 1) * w];
     let target = left(w - 1);
     let whole: f64 = r[(w - 1) * w..].iter().map(|v| v * v).sum();

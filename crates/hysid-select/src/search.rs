@@ -2,21 +2,20 @@
 //!
 //! All of them fill a [`Table`]: for each number of terms the best subset seen and what it leaves unexplained.
 
-use hysid_linalg::Columns;
-
 use crate::criterion::choose;
+use crate::evidence::Evidence;
 use crate::forward::Factor;
 use crate::moments::Moments;
 use crate::options::longest;
 use crate::pursuit::Pursuit;
-use crate::refit::{Goal, Refit, refit};
+use crate::refit::{Goal, Refit};
 use crate::rescore::{Choice, choose_next};
 use crate::{Criterion, Options, Rejected, RejectedReason, Search, StopReason};
 
 /// A subset must leave less than this part of the old one's residual to count as better; below [`EXACT`] nothing is better.
 const BETTER: f64 = 1.0 - 1e-9;
 /// What inner products in double precision cannot tell from nothing, relative to y'y.
-const EXACT: f64 = 1e-14;
+pub(crate) const EXACT: f64 = 1e-14;
 
 /// The best subset for each number of terms (place k - 1 for k terms).
 #[derive(Default)]
@@ -76,19 +75,15 @@ impl Table {
 }
 
 /// Fills the table as the options say.
-pub(crate) fn search<C: Columns + ?Sized>(
-    phi: &C,
-    y: &[f64],
-    moments: &mut Moments<'_, C>,
-    options: &Options,
-) -> Table {
+pub(crate) fn search<E: Evidence + ?Sized>(moments: &mut Moments<'_, E>, options: &Options) -> Table {
     let mut table = Table::default();
-    let longest = longest(options, phi.rows(), phi.cols());
+    let (samples, candidates) = (moments.evidence.samples(), moments.evidence.candidates());
+    let longest = longest(options, samples, candidates);
     let overshoot = match options.search {
-        Search::Floating => longest.saturating_add(options.patience).min(phi.cols()).min(phi.rows().max(2) - 1),
+        Search::Floating => longest.saturating_add(options.patience).min(candidates).min(samples.max(2) - 1),
         _ => longest,
     };
-    let greedy = grow(phi, y, moments, options, Factor::new(moments), overshoot, Some(&mut table));
+    let greedy = grow(moments, options, Factor::new(moments), overshoot, Some(&mut table));
     table.offer_path(&greedy);
     let reached = greedy.chosen.len();
     match options.search {
@@ -100,7 +95,7 @@ pub(crate) fn search<C: Columns + ?Sized>(
                     moments.make(first, []);
                     factor.add(first, moments.column(first));
                 }
-                let path = grow(phi, y, moments, options, factor, reached, None);
+                let path = grow(moments, options, factor, reached, None);
                 table.offer_path(&path);
             }
         }
@@ -117,10 +112,8 @@ pub(crate) fn search<C: Columns + ?Sized>(
 ///
 /// With a table to report to it is the main path: rejections and doubts are written down, near-ties are decided from the
 /// samples, and it ends early when the criterion has not improved for `patience` terms.
-fn grow<C: Columns + ?Sized>(
-    phi: &C,
-    y: &[f64],
-    moments: &mut Moments<'_, C>,
+fn grow<E: Evidence + ?Sized>(
+    moments: &mut Moments<'_, E>,
     options: &Options,
     mut factor: Factor,
     longest: usize,
@@ -135,7 +128,8 @@ fn grow<C: Columns + ?Sized>(
             _ => match ranked.first() {
                 Some(&best) => match report.as_deref_mut() {
                     Some(table) => {
-                        let Choice { column, doubtful } = choose_next(phi, y, &factor, &ranked, options.pivot_guard);
+                        let Choice { column, doubtful } =
+                            choose_next(moments.evidence, &factor, &ranked, options.pivot_guard);
                         if doubtful && table.doubtful_from.is_none() {
                             table.doubtful_from = Some(step);
                         }
@@ -165,8 +159,8 @@ fn grow<C: Columns + ?Sized>(
         if factor.chosen.len() == next_look && options.criterion.has_minimum() {
             // A look costs a refit of the whole path: the further it has come, the rarer.
             next_look += (next_look / 2).max(4);
-            let path = refit(phi, y, &factor.chosen, moments.target_energy, Goal::of(&options.criterion));
-            let values = path.values(&options.criterion, phi.rows());
+            let path = moments.evidence.refit(&factor.chosen, moments.target_energy, Goal::of(&options.criterion));
+            let values = path.values(&options.criterion, moments.evidence.samples());
             let best = choose(&options.criterion, &values, &path.sse);
             table.refit = Some((factor.chosen.clone(), path));
             if best + options.patience <= factor.chosen.len() {
@@ -178,7 +172,7 @@ fn grow<C: Columns + ?Sized>(
 }
 
 /// Writes down candidates that the guard shuts out from here on.
-fn note_rejected<C: Columns + ?Sized>(table: &mut Table, moments: &Moments<'_, C>, factor: &Factor, guard: f64) {
+fn note_rejected<E: Evidence + ?Sized>(table: &mut Table, moments: &Moments<'_, E>, factor: &Factor, guard: f64) {
     let step = factor.chosen.len();
     for column in 0..moments.len() {
         let left = factor.energy[column];
@@ -192,8 +186,8 @@ fn note_rejected<C: Columns + ?Sized>(table: &mut Table, moments: &Moments<'_, C
 }
 
 /// The `width` best subsets of each size, each made from one of the `width` best of the size below.
-fn beam<C: Columns + ?Sized>(
-    moments: &mut Moments<'_, C>,
+fn beam<E: Evidence + ?Sized>(
+    moments: &mut Moments<'_, E>,
     options: &Options,
     width: usize,
     longest: usize,
@@ -237,7 +231,7 @@ fn beam<C: Columns + ?Sized>(
 /// The moves on the best subset of k terms: exchange one term for another (again and again while that helps); take the
 /// best further term, for k + 1; give back the term that is missed least, for k - 1. Each accepted move leaves less of the
 /// target than before, so it ends.
-fn settle<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, options: &Options, table: &mut Table) {
+fn settle<E: Evidence + ?Sized>(moments: &mut Moments<'_, E>, options: &Options, table: &mut Table) {
     let guard = options.pivot_guard;
     let fixed = options.forced.len();
     // From the longest down: what the greedy path took too early is given back on the way.
@@ -270,7 +264,7 @@ fn settle<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, options: &Options, 
 }
 
 /// Exchanges one term for another while that leaves less of the target.
-fn exchange<C: Columns + ?Sized>(moments: &mut Moments<'_, C>, factor: &mut Factor, fixed: usize, guard: f64) {
+fn exchange<E: Evidence + ?Sized>(moments: &mut Moments<'_, E>, factor: &mut Factor, fixed: usize, guard: f64) {
     loop {
         let sse = factor.sse();
         if sse <= EXACT {
