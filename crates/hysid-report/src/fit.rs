@@ -6,7 +6,7 @@ use hysid_validate::{CorrelationTest, ResidualRecord, by_branch, residual_tests}
 
 use crate::figure::{FigureError, LogAxes, Mark, Plot, Tone, envelope};
 use crate::page::{Align, Page, Table, Tenor};
-use crate::words::{Provenance, number, p_value, percent};
+use crate::words::{Provenance, number, p_value, percent, sum};
 
 /// Stretches that a long series is drawn with: about as many as the figure has pixels.
 const BUCKETS: usize = 700;
@@ -116,11 +116,10 @@ fn equation(page: &mut Page, report: &FitReport) {
     }
     page.table(&table);
     if !s.noise.is_empty() {
-        let terms: Vec<String> =
-            s.noise.iter().map(|t| format!("{} e[n-{}]", number(t.coefficient), t.residual_lag)).collect();
+        let terms = s.noise.iter().map(|t| (t.coefficient, format!("e[n-{}]", t.residual_lag)));
         page.text(&format!(
-            "One step ahead, past one-step residuals e help: + {}. They take no part in the free run.",
-            terms.join(" + ")
+            "One step ahead, past one-step residuals e help: {}. They take no part in the free run.",
+            sum(terms)
         ));
     }
     page.text("As LaTeX:");

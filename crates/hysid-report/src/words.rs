@@ -26,6 +26,14 @@ pub(crate) fn number(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
+/// Coefficients and what they multiply as a sum: `- 0.64 e[n-1] + 0.2 e[n-2]`, every sign before its number.
+pub(crate) fn sum(terms: impl IntoIterator<Item = (f64, String)>) -> String {
+    let signed = |(c, what): (f64, String)| {
+        format!("{} {} {what}", if c.is_sign_negative() { '-' } else { '+' }, number(c.abs()))
+    };
+    terms.into_iter().map(signed).collect::<Vec<_>>().join(" ")
+}
+
 /// A share as a percentage.
 pub(crate) fn percent(share: f64) -> String {
     format!("{} %", number((1e3 * share).round() / 10.0))
@@ -71,6 +79,15 @@ mod tests {
         ];
         for (value, expected) in cases {
             assert_eq!(number(value), expected);
+        }
+    }
+
+    #[test]
+    fn a_sum_has_its_signs_before_the_numbers() {
+        let cases: [(&[f64], &str); 3] =
+            [(&[], ""), (&[-0.6452], "- 0.6452 e1"), (&[0.5, -0.1, 2.0], "+ 0.5 e1 - 0.1 e2 + 2 e3")];
+        for (coefficients, expected) in cases {
+            assert_eq!(sum(coefficients.iter().zip(1..).map(|(c, i)| (*c, format!("e{i}")))), expected);
         }
     }
 

@@ -1,5 +1,6 @@
 //! Figures as SVG text: [`Plot`] for anything over two axes, [`Map`] for a value over a grid of cells.
 
+mod legend;
 mod map;
 mod plot;
 mod thin;

@@ -4,7 +4,13 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::FigureError;
+use super::legend::{Legend, Sample};
 use crate::words::number;
+
+/// Pixels around the axes, to their right, and for the vertical axis's labels.
+const MARGIN: i32 = 6;
+const RIGHT: i32 = 14;
+const LEFT: i32 = 64;
 
 /// A colour with a meaning, the same on every page. The set is told apart by people with colour-blindness too (Okabe-Ito).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,10 +183,16 @@ impl Plot {
         let levels: Vec<f64> = self.levels.iter().filter_map(|&v| self.place((1.0, v))).map(|p| p.1).collect();
         let xs = padded(all().map(|p| p.0), 0.0);
         let ys = padded(all().map(|p| p.1).chain(levels.iter().copied()).chain(stems.then_some(0.0)), 0.06);
-        let mut chart = ChartBuilder::on(area)
-            .margin(6)
-            .margin_right(14)
-            .set_label_area_size(LabelAreaPosition::Left, 64)
+        let shade = RGBColor(0, 114, 178).mix(0.08);
+        let patches = self.bands.iter().map(|b| (b.label.as_str(), Sample::Patch(shade)));
+        let marks = self.layers.iter().map(|l| (l.label.as_str(), Sample::Mark(l.mark, l.tone.rgb())));
+        let legend = Legend::new(patches.chain(marks), LEFT + MARGIN, self.size.0 as i32 - RIGHT);
+        let (strip, below) = area.split_vertically(legend.height());
+        legend.draw(&strip)?;
+        let mut chart = ChartBuilder::on(&below)
+            .margin(MARGIN)
+            .margin_right(RIGHT)
+            .set_label_area_size(LabelAreaPosition::Left, LEFT)
             .set_label_area_size(LabelAreaPosition::Bottom, 40)
             .build_cartesian_2d(xs.0..xs.1, ys.0..ys.1)
             .map_err(FigureError::of)?;
@@ -204,14 +216,8 @@ impl Plot {
             .map_err(FigureError::of)?;
         for band in &self.bands {
             let (from, to) = (band.from.clamp(xs.0, xs.1), band.to.clamp(xs.0, xs.1));
-            let shade = RGBColor(0, 114, 178).mix(0.08).filled();
-            let drawn =
-                chart.draw_series([Rectangle::new([(from, ys.0), (to, ys.1)], shade)]).map_err(FigureError::of)?;
-            if !band.label.is_empty() {
-                drawn
-                    .label(band.label.as_str())
-                    .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 16, y + 5)], shade));
-            }
+            let whole = Rectangle::new([(from, ys.0), (to, ys.1)], shade.filled());
+            chart.draw_series([whole]).map_err(FigureError::of)?;
         }
         for level in levels {
             let style = Tone::Faint.rgb().stroke_width(1);
@@ -222,32 +228,17 @@ impl Plot {
         for (layer, points) in layers {
             let color = layer.tone.rgb();
             let line = color.stroke_width(if points.len() > 600 { 1 } else { 2 });
-            let drawn = match layer.mark {
-                Mark::Line => chart.draw_series(LineSeries::new(points, line)).map_err(FigureError::of)?,
-                Mark::Dashed => {
-                    chart.draw_series(DashedLineSeries::new(points, 6, 4, line)).map_err(FigureError::of)?
-                }
+            match layer.mark {
+                Mark::Line => chart.draw_series(LineSeries::new(points, line)).map(|_| ()),
+                Mark::Dashed => chart.draw_series(DashedLineSeries::new(points, 6, 4, line)).map(|_| ()),
                 Mark::Dots => chart
                     .draw_series(points.into_iter().map(|p| Circle::new(p, 2, color.mix(0.7).filled())))
-                    .map_err(FigureError::of)?,
+                    .map(|_| ()),
                 Mark::Stems => chart
                     .draw_series(points.into_iter().map(|(x, y)| PathElement::new([(x, 0.0), (x, y)], line)))
-                    .map_err(FigureError::of)?,
-            };
-            if !layer.label.is_empty() {
-                let stroke = color.stroke_width(2);
-                drawn.label(layer.label.as_str()).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], stroke));
+                    .map(|_| ()),
             }
-        }
-        let named = self.layers.iter().any(|l| !l.label.is_empty()) || self.bands.iter().any(|b| !b.label.is_empty());
-        if named {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.85))
-                .label_font(text(12))
-                .draw()
-                .map_err(FigureError::of)?;
+            .map_err(FigureError::of)?;
         }
         Ok(())
     }
