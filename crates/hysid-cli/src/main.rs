@@ -30,6 +30,7 @@ enum Command {
     Diagnose(commands::diagnose::Args),
     Inspect(commands::inspect::Args),
     Predict(commands::predict::Args),
+    Select(commands::select::Args),
     Simulate(commands::simulate::Args),
     Generate(commands::generate::Args),
 }
@@ -55,6 +56,7 @@ fn run(line: impl IntoIterator<Item = OsString>) -> Result<(), Failure> {
         Command::Diagnose(args) => commands::diagnose::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Predict(args) => commands::predict::run(&args),
+        Command::Select(args) => commands::select::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Generate(args) => commands::generate::run(&args),
     }

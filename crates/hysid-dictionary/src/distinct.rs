@@ -5,8 +5,9 @@
 //! ten lagged signals: 41 041 inner products, 5126 sums). Each class of products that differ by a shift in time only is summed up once; its other
 //! members follow from what enters and leaves at the ends of a stretch (see [`Class::least`]).
 //!
-//! A product is a head times a tail, the tail being its factors of largest lag, half of the degree. Heads with the same tails are the rows,
-//! those tails the columns of a small matrix product over each tile of samples.
+//! A product is a head times a tail, the tail being its factors of largest lag, half of the degree. Tails with the same heads are the
+//! columns, those heads the rows of a matrix product over each tile of samples: a tail has all heads that end before it begins, so that few
+//! of these products have few rows.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -111,7 +112,7 @@ impl Series {
     }
 }
 
-/// Heads that have the same tails.
+/// Tails that have the same heads.
 #[derive(Debug)]
 struct Group {
     rows: Vec<Row>,
@@ -192,27 +193,31 @@ impl Kernel {
         let numbers: HashMap<Vec<Factor>, usize> =
             by_head.keys().enumerate().map(|(n, (_, h))| (h.clone(), n)).collect();
         let mut heads = Vec::with_capacity(by_head.len());
-        let mut shared: BTreeMap<Vec<u32>, Vec<(usize, Vec<u32>)>> = BTreeMap::new();
-        for (n, ((_, head), mut tails)) in by_head.into_iter().enumerate() {
+        // The heads of each tail, and the tails that have the same heads.
+        let mut by_tail: BTreeMap<u32, Vec<(usize, u32)>> = BTreeMap::new();
+        for (n, ((_, head), tails)) in by_head.into_iter().enumerate() {
             if let Some((last, before)) = head.split_last() {
                 let factor = place(&series, &index, std::slice::from_ref(last), 0);
                 heads.push((numbers.get(before).copied().unwrap_or(0), factor));
             }
-            tails.sort_unstable();
-            let (columns, own): (Vec<u32>, Vec<u32>) = tails.into_iter().unzip();
-            if !columns.is_empty() {
-                shared.entry(columns).or_default().push((n, own));
+            for (tail, class) in tails {
+                by_tail.entry(tail).or_default().push((n, class));
             }
+        }
+        let mut shared: BTreeMap<Vec<usize>, Vec<(u32, Vec<u32>)>> = BTreeMap::new();
+        for (tail, members) in by_tail {
+            let (rows, own): (Vec<usize>, Vec<u32>) = members.into_iter().unzip();
+            shared.entry(rows).or_default().push((tail, own));
         }
         let mut order = Vec::with_capacity(classes.len());
         let mut groups = Vec::with_capacity(shared.len());
-        for (columns, members) in shared {
+        for (members, tails) in shared {
             let mut rows = Vec::with_capacity(members.len());
-            for (head, own) in members {
+            for (r, head) in members.into_iter().enumerate() {
                 rows.push(Row { from: head * T, to: order.len() });
-                order.extend(own);
+                order.extend(tails.iter().map(|(_, own)| own[r]));
             }
-            groups.push(Group { rows, columns });
+            groups.push(Group { rows, columns: tails.iter().map(|(tail, _)| *tail).collect() });
         }
         Self { series, len, heads, groups, order, classes: classes.len(), machine: Machine::detect() }
     }

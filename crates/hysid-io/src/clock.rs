@@ -51,9 +51,8 @@ pub fn fit_clock(t: &[f64], decimals: u32) -> Result<ClockFit, (usize, InputProb
     }
     let steps = (t.len() - 1) as f64;
     let rough = (last - first) / steps;
-    let unit = 10_f64.powi(-(decimals.min(300) as i32));
-    let arithmetic = 4.0 * f64::EPSILON * last.abs().max(first.abs());
-    let allowed = (JITTER * rough).max(unit.min(COARSEST * rough)) + arithmetic;
+    let largest = last.abs().max(first.abs());
+    let allowed = step_tolerance(rough, decimals, largest);
     let worst = t
         .iter()
         .enumerate()
@@ -63,7 +62,7 @@ pub fn fit_clock(t: &[f64], decimals: u32) -> Result<ClockFit, (usize, InputProb
         return Err(uneven(t, rough, allowed));
     }
     // Half a unit of rounding at either end of the span bounds the error of the rough period; least squares lies well inside.
-    let slack = (unit.min(COARSEST * rough) + arithmetic) / steps;
+    let slack = (rounding(rough, decimals) + arithmetic(largest)) / steps;
     let period_s = shortest(least_squares_period(t, first), slack);
     let off = |n: usize, x: f64| (x - (first + period_s * n as f64)).abs();
     let (mut largest, mut sum) = (0.0_f64, 0.0);
@@ -77,6 +76,21 @@ pub fn fit_clock(t: &[f64], decimals: u32) -> Result<ClockFit, (usize, InputProb
         largest_deviation_s: largest,
         rms_deviation_s: (sum / t.len() as f64).sqrt(),
     })
+}
+
+/// By how much stamps of this period, number of decimals and largest size may lie off their clock.
+pub(crate) fn step_tolerance(period: f64, decimals: u32, largest: f64) -> f64 {
+    (JITTER * period).max(rounding(period, decimals)) + arithmetic(largest)
+}
+
+/// What the rounding of stamps to this many decimals excuses.
+fn rounding(period: f64, decimals: u32) -> f64 {
+    10_f64.powi(-(decimals.min(300) as i32)).min(COARSEST * period)
+}
+
+/// What arithmetic with stamps of this size excuses.
+fn arithmetic(largest: f64) -> f64 {
+    4.0 * f64::EPSILON * largest
 }
 
 /// Where the clock first leaves the median step, so that the message points at the row at fault and not at the farthest one.

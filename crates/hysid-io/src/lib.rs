@@ -12,6 +12,7 @@
 mod atomic;
 mod chunks;
 mod clock;
+mod clock_watch;
 mod error;
 mod json;
 mod npy;
@@ -26,6 +27,7 @@ mod write;
 pub use atomic::write_bytes;
 pub use chunks::CsvChunks;
 pub use clock::{ClockFit, fit_clock};
+pub use clock_watch::ClockWatch;
 pub use error::{InputError, InputProblem, WriteError};
 pub use json::{read_json, read_versioned, write_json, write_versioned};
 pub use npy::{Npy, NpyError, read_npy};

@@ -25,6 +25,7 @@ pub struct CsvStream {
     lines: u64,
     blanks: u64,
     bytes: u64,
+    decimals: Vec<u32>,
     ended: bool,
 }
 
@@ -36,15 +37,20 @@ impl CsvStream {
     pub fn open(file: &Path, select: Option<&[&str]>) -> Result<Self, InputError> {
         let Source { blocks, layout, text, at, lines } = start(file, select)?;
         let (sender, receiver) = sync_channel(TOGETHER);
-        let bytes = at as u64;
+        let (bytes, decimals) = (at as u64, vec![0; layout.selected.len()]);
         // Without a thread to read ahead the file cannot be streamed; it ends when the receiver is gone.
         let _reader = thread::spawn(move || read_ahead(blocks, text, at, |block| sender.send(block).is_ok()));
-        Ok(Self { layout, blocks: receiver, lines, blanks: 0, bytes, ended: false })
+        Ok(Self { layout, blocks: receiver, lines, blanks: 0, bytes, decimals, ended: false })
     }
 
     /// The names of all columns, in the order of the file.
     pub fn header(&self) -> &[String] {
         &self.layout.header
+    }
+
+    /// The largest number of decimals with which the `i`-th selected column was written so far.
+    pub fn decimals(&self, i: usize) -> u32 {
+        self.decimals.get(i).copied().unwrap_or(0)
     }
 
     /// Bytes of text read so far.
@@ -81,11 +87,14 @@ impl CsvStream {
     /// Gives the rows of a block (or its error) their lines in the file.
     fn place(&mut self, parsed: Result<Parsed, InputError>) -> Result<Option<Chunk>, InputError> {
         let before = self.lines;
-        let Parsed { mut chunk, bytes, lines, blanks, .. } = parsed.map_err(|mut e| {
+        let Parsed { mut chunk, bytes, lines, blanks, decimals } = parsed.map_err(|mut e| {
             self.ended = true;
             e.line = e.line.map(|line| line + before);
             e
         })?;
+        for (all, new) in self.decimals.iter_mut().zip(decimals) {
+            *all = (*all).max(new);
+        }
         self.bytes += bytes as u64;
         self.lines += lines;
         if chunk.lines.is_empty() {

@@ -7,6 +7,7 @@
 mod cases;
 mod guard;
 mod page;
+mod stream;
 
 use std::path::PathBuf;
 
@@ -48,6 +49,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return guard::run(&shell, &root, args.store);
     }
     cmd!(shell, "cargo build --release --quiet -p hysid-cli -p hysid-bench").run()?;
+    if args.cases == ["stream"] {
+        return stream::run(&shell, &root);
+    }
     if args.criterion {
         cmd!(shell, "cargo bench --quiet -p hysid-bench").run()?;
     }

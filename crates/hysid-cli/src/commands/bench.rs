@@ -205,24 +205,24 @@ fn least(values: &[f64]) -> f64 {
 
 /// CPU time of all threads of this process, in seconds.
 #[cfg(unix)]
-fn cpu_seconds() -> Option<f64> {
+pub(crate) fn cpu_seconds() -> Option<f64> {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Some(now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9)
 }
 
 /// No CPU clock here.
 #[cfg(not(unix))]
-fn cpu_seconds() -> Option<f64> {
+pub(crate) fn cpu_seconds() -> Option<f64> {
     None
 }
 
 /// A line of `/proc/self/status`, in MiB.
-fn status(key: &str) -> Option<f64> {
+pub(crate) fn status(key: &str) -> Option<f64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find_map(|l| l.strip_prefix(key))?;
     Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
 }
 
-fn load_average() -> Option<f64> {
+pub(crate) fn load_average() -> Option<f64> {
     std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
 }

@@ -65,7 +65,7 @@ pub struct Args {
 
 /// A number, or left to the data.
 #[derive(Debug, Clone, Copy)]
-struct AutoOr(Option<usize>);
+pub(crate) struct AutoOr(pub(crate) Option<usize>);
 
 fn decimate(text: &str) -> Result<Decimate, String> {
     match text {
@@ -84,7 +84,7 @@ fn factors(text: &str) -> Result<Factors, String> {
     }
 }
 
-fn terms(text: &str) -> Result<AutoOr, String> {
+pub(crate) fn terms(text: &str) -> Result<AutoOr, String> {
     match text {
         "auto" => Ok(AutoOr(None)),
         _ => text.parse().map(|n| AutoOr(Some(n))).map_err(|_| "give auto or a whole number".into()),
@@ -104,7 +104,7 @@ fn criterion(text: &str) -> Result<Criterion, String> {
 }
 
 /// The clock's column where the file has it; without one, samples are counted in seconds.
-const TIME: &str = "t_s";
+pub(crate) const TIME: &str = "t_s";
 
 /// Samples without which no recording can teach even a linear model and hold some back to judge it.
 const FEWEST_SAMPLES: usize = 20;

@@ -9,5 +9,6 @@ pub mod fit;
 pub mod generate;
 pub mod inspect;
 pub mod predict;
+pub mod select;
 pub mod simulate;
 mod simulation_file;
