@@ -15,7 +15,7 @@ pub struct Args {
 }
 
 /// The quick form of each task: its name and the arguments.
-const TASKS: [&[&str]; 3] = [&["layers"], &["reproduce", "--check"], &["prove", "--quick"]];
+const TASKS: [&[&str]; 4] = [&["layers"], &["bench", "--guard"], &["reproduce", "--check"], &["prove", "--quick"]];
 
 /// Runs the tasks.
 pub fn run(args: &Args) -> anyhow::Result<()> {

@@ -4,6 +4,8 @@
 
 use std::f64::consts::TAU;
 
+pub mod timing;
+
 /// The terms of the known system: coefficient, and the term as the comparison with other tools writes it.
 pub const TRUTH: [(f64, &str); 11] = [
     (0.05, "1"),

@@ -1,12 +1,17 @@
 //! `cargo xtask bench`: our side of the comparison with other tools, the other tools themselves, and the instruction counts.
 //!
-//! Every command gets the same data file and prints one JSON object; each repetition is timed by the command itself, from
-//! arrays in memory. Ratios are of CPU seconds at one thread, medians with the smallest and largest: on a machine that others use,
-//! wall time says little.
+//! All contenders of a case get the same data file and print one JSON object; each repetition is timed by the program itself,
+//! from arrays in memory. They take turns, round after round, and ratios are taken round by round: on a machine that
+//! others use, that and CPU time are what can be trusted.
 
-mod cases;
+mod case;
+mod diagnosis;
 mod guard;
+mod measure;
 mod page;
+mod selection;
+mod simulation;
+mod slopes;
 mod stream;
 
 use std::path::PathBuf;
@@ -14,18 +19,27 @@ use std::path::PathBuf;
 use anyhow::Context;
 use xshell::{Shell, cmd};
 
-/// Time term selection; with `--peers` the other tools too; writes `docs/performance.md`.
+/// Time selection, operators, simulation and diagnosis; with `--peers` the other tools too; renews `docs/performance.md`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Run the other tools too (Python with their packages, installed into `target/peers`).
     #[arg(long)]
     peers: bool,
-    /// The other tools' scripts.
+    /// The other tools' scripts for term selection.
     #[arg(long, default_value = "../shared/bench/peers")]
     scripts: PathBuf,
-    /// Only these cases.
+    /// Only these cases; the others keep their tables.
     #[arg(long, value_delimiter = ',')]
     cases: Vec<String>,
+    /// Rounds in which all take their turn.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    rounds: u16,
+    /// Only print the tables; `docs/performance.md` is left alone.
+    #[arg(long)]
+    dry: bool,
+    /// Cost against the sizes of a selection instead: figures in `docs/figures` and slopes.
+    #[arg(long, conflicts_with_all = ["peers", "cases", "guard"])]
+    plots: bool,
     /// Count instructions of four kernels (valgrind) and fail on more than 10 % above the stored numbers.
     #[arg(long)]
     guard: bool,
@@ -48,41 +62,41 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if args.guard {
         return guard::run(&shell, &root, args.store);
     }
-    cmd!(shell, "cargo build --release --quiet -p hysid-cli -p hysid-bench").run()?;
     if args.cases == ["stream"] {
+        cmd!(shell, "cargo build --release --quiet -p hysid-cli").run()?;
         return stream::run(&shell, &root);
     }
-    if args.criterion {
-        cmd!(shell, "cargo bench --quiet -p hysid-bench").run()?;
-    }
-    let known = cases::all();
+    let known: Vec<case::Case> =
+        [selection::cases(), simulation::cases(), diagnosis::cases()].into_iter().flatten().collect();
     if let Some(odd) = args.cases.iter().find(|c| known.iter().all(|k| k.name != **c)) {
         let names: Vec<&str> = known.iter().map(|k| k.name).collect();
         anyhow::bail!("there is no case `{odd}`; there are {}", names.join(", "));
     }
-    let python = if args.peers { Some(cases::python(&shell, &root, &args.scripts)?) } else { None };
-    let mut results = Vec::new();
-    for case in known.iter().filter(|c| args.cases.is_empty() || args.cases.iter().any(|n| n == c.name)) {
-        let data = cases::data(&shell, &root, case)?;
-        for threads in [1, 2] {
-            let ours = cases::ours(&shell, &root, case, &data, threads).with_context(|| case.name.to_string())?;
-            eprintln!("{}: {} with {threads} threads, CPU {:.3e} s", case.name, ours.tool, ours.cpu.middle);
-            results.push(ours);
-        }
-        for peer in case.peers.iter().filter(|_| python.is_some()) {
-            let Some(python) = &python else { continue };
-            let result = cases::peer(&shell, python, &args.scripts, case, peer, &data);
-            match result {
-                Ok(r) => {
-                    eprintln!("{}: {} CPU {:.3e} s", case.name, r.tool, r.cpu.middle);
-                    results.push(r);
-                }
-                Err(e) => eprintln!("{}: {peer} failed: {e:#}", case.name),
-            }
-        }
+    cmd!(shell, "cargo build --release --quiet -p hysid-cli -p hysid-bench").run()?;
+    if args.criterion {
+        cmd!(shell, "cargo bench --quiet -p hysid-bench").run()?;
     }
+    let rounds = usize::from(args.rounds);
     let path = root.join("docs/performance.md");
-    std::fs::write(&path, page::write(&path, &known, &results, args.peers)?)?;
-    eprintln!("wrote {}", path.display());
+    let renew = |name: &str, block: &str| -> anyhow::Result<()> {
+        println!("{block}");
+        if !args.dry {
+            let page = std::fs::read_to_string(&path)?;
+            std::fs::write(&path, page::renew(&page, name, block))?;
+        }
+        Ok(())
+    };
+    if args.plots {
+        return renew("slopes", &slopes::run(&shell, &root, rounds)?);
+    }
+    let scripts = root.join(&args.scripts);
+    let python = if args.peers { Some(measure::python(&shell, &root, &scripts)?) } else { None };
+    let place = measure::Place { shell: &shell, root: &root, python, scripts: &scripts };
+    for case in known.iter().filter(|c| args.cases.is_empty() || args.cases.iter().any(|n| n == c.name)) {
+        let outcomes = place.run(case, rounds).with_context(|| case.name.to_string())?;
+        let peers = if args.peers { " --peers" } else { "" };
+        let command = format!("cargo xtask bench{peers} --cases {} --rounds {rounds}", case.name);
+        renew(case.name, &page::block(case, &outcomes, &command))?;
+    }
     Ok(())
 }
