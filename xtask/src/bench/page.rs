@@ -88,7 +88,10 @@ pub fn judge(goal: &Goal, case: &Case, outcomes: &[Outcome]) -> Option<(String, 
         }
         Goal::Faster { quick, slow, times } => {
             let ratio = of(slow)?.over(of(quick)?);
-            (format!("{quick} {times} times faster than {slow}: {} times", spread(ratio)), ratio.middle >= times)
+            (
+                format!("\"{quick}\" {times} times faster than \"{slow}\": {} times", spread(ratio)),
+                ratio.middle >= times,
+            )
         }
         Goal::Within { tool, other, times } => {
             let (tool, other) = (of(tool)?, of(other)?);
@@ -97,19 +100,22 @@ pub fn judge(goal: &Goal, case: &Case, outcomes: &[Outcome]) -> Option<(String, 
                 _ => (tool.wall_over(other), "wall"),
             };
             let (tool, other) = (&tool.contender.tool, &other.contender.tool);
-            (format!("{tool} within {times} times of {other} ({clock} time): {}", spread(ratio)), ratio.middle <= times)
+            (
+                format!("\"{tool}\" at most {times} times \"{other}\" ({clock} time): {}", spread(ratio)),
+                ratio.middle <= times,
+            )
         }
         Goal::Rate { tool, least } => {
             let rate = case.samples as f64 / Spread::of(&of(tool)?.cpu).middle;
-            (format!("{tool} at {} samples/s: {}", number(least), number(rate)), rate >= least)
+            (format!("\"{tool}\" at {} samples/s: {}", number(least), number(rate)), rate >= least)
         }
         Goal::Wall { tool, most } => {
             let wall = Spread::of(&of(tool)?.wall);
-            (format!("{tool} in {most} s: {} s", spread(wall)), wall.middle <= most)
+            (format!("\"{tool}\" in {most} s (wall time): {} s", spread(wall)), wall.middle <= most)
         }
         Goal::Memory { tool, most_mib } => {
             let peak = of(tool)?.peak_mib;
-            (format!("{tool} below {most_mib} MiB: {peak:.0} MiB"), peak <= most_mib)
+            (format!("\"{tool}\" below {most_mib} MiB: {peak:.0} MiB"), peak <= most_mib)
         }
         Goal::Speedup { one, two, least } => {
             let ratio = of(one)?.wall_over(of(two)?);
@@ -132,7 +138,8 @@ pub fn number(x: f64) -> String {
     match size {
         _ if !x.is_finite() => "-".into(),
         0.0 => "0".into(),
-        0.01..0.9995 => format!("{x:.3}"),
+        0.01..0.09995 => format!("{x:.4}"),
+        0.09995..0.9995 => format!("{x:.3}"),
         0.9995..9.995 => format!("{x:.2}"),
         9.995..99.95 => format!("{x:.1}"),
         99.95..99_999.5 => format!("{x:.0}"),
@@ -165,6 +172,7 @@ mod tests {
             (0.0, "0"),
             (1.0, "1.00"),
             (0.5, "0.500"),
+            (0.0123, "0.0123"),
             (12.34, "12.3"),
             (1234.5, "1234"),
             (1.5e6, "1.50e6"),
