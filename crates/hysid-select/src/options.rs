@@ -193,11 +193,19 @@ impl Options {
         if gram.target == 0.0 {
             return Err(SelectError::ZeroTarget);
         }
+        self.check_without_samples(cols)
+    }
+
+    /// Whether these options serve for a selection from the inner products of `cols` columns; to be asked before long data are read.
+    ///
+    /// # Errors
+    /// An option out of range; [`Criterion::Blocks`], which needs the samples.
+    pub fn check_without_samples(&self, cols: usize) -> Result<(), SelectError> {
         if let Criterion::Blocks(_) = self.criterion {
             let (given, allowed) = ("left-out blocks".into(), "a criterion that needs no samples".into());
             return Err(SelectError::Option { option: "criterion", given, allowed });
         }
-        self.check_options(rows, cols)
+        self.check_options(usize::MAX, cols)
     }
 
     fn check_options(&self, rows: usize, cols: usize) -> Result<(), SelectError> {

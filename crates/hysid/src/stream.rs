@@ -4,10 +4,10 @@
 //! and the selection is made from the Gram matrix ([`select_gram`], which says what that costs in precision). Neither the result nor an error
 //! depends on the number of threads.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hysid_dictionary::{Dictionary, DictionaryError, GramSums, Record};
-use hysid_io::{Chunk, ClockWatch, CsvStream, InputError};
+use hysid_io::{Chunk, ClockWatch, CsvStream, InputError, InputProblem};
 use hysid_select::{Options, SelectError, Selection, select_gram};
 
 /// What a selection from a file found.
@@ -32,12 +32,20 @@ pub enum StreamError {
     /// The file.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// The dictionary, or a file too short for it.
+    /// The dictionary.
     #[error(transparent)]
     Dictionary(#[from] DictionaryError),
-    /// The selection.
+    /// The options of the selection.
     #[error(transparent)]
-    Select(#[from] SelectError),
+    Options(#[from] SelectError),
+    /// A file that reads well but holds nothing to select from.
+    #[error("{}: {problem}", file.display())]
+    Unfit {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
 }
 
 /// Selects terms of `dictionary`, whose signals name the columns, from a CSV file; `time` is the file's time column, if it has one.
@@ -54,6 +62,7 @@ pub fn select_file(
     options: &Options,
     progress: &dyn Fn(u64),
 ) -> Result<Streamed, StreamError> {
+    options.check_without_samples(dictionary.len())?;
     let mut sums = GramSums::new(dictionary)?;
     let signals = dictionary.signals();
     let columns: Vec<&str> = std::iter::once(signals.output())
@@ -73,7 +82,12 @@ pub fn select_file(
         Ok(sums.push(&Record::new(&chunk.columns[0], inputs))?)
     })?;
     let distinct_sums = sums.distinct_sums();
-    let selection = select_gram(&sums.finish()?, options)?;
+    if rows == 0 {
+        return Err(InputError::whole(file, InputProblem::HeaderOnly).into());
+    }
+    let unfit = |problem: String| StreamError::Unfit { file: file.to_path_buf(), problem };
+    let gram = sums.finish().map_err(|e| unfit(e.to_string()))?;
+    let selection = select_gram(&gram, options).map_err(|e| unfit(e.to_string()))?;
     Ok(Streamed { selection, rows, bytes, period_s: clock.period_s(), distinct_sums })
 }
 
