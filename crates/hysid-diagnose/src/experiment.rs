@@ -63,6 +63,9 @@ pub fn present_separation(setting: &Setting<'_>, winner: &Hypothesis<'_>, rival:
     )
 }
 
+/// The shape that stands for the recorded inputs themselves, scaled.
+const RECORDED: &str = "the recorded inputs";
+
 /// An input of the library.
 struct Trial {
     shape: &'static str,
@@ -89,7 +92,7 @@ fn library(setting: &Setting<'_>, seed: u64) -> Vec<Trial> {
     if inputs.len() > 1 || setting.original.is_static() {
         for level in [0.3, 0.6, 1.5, 2.0] {
             let scaled = inputs.iter().map(|c| c[..n].iter().map(|x| level * x).collect()).collect();
-            offer("the recorded inputs", level, band, scaled);
+            offer(RECORDED, level, band, scaled);
         }
         return out;
     }
@@ -131,18 +134,25 @@ fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) 
         d
     };
     let (da, db) = (started(a), started(b));
+    // Louder means faster, and a law that slides within a sample needs shorter steps for it.
+    let substeps = if trial.level > 1.0 { 2 * setting.substeps } else { setting.substeps };
     let one = |truth: &Simulation, noise: &Whitener, rival: &Simulation, rival_values: &Values| -> Option<f64> {
         let empty = DataSet::of_drive(trial.drive.clone(), vec![vec![0.0; n]; outputs], setting.data.period_s);
         let mut fixed = truth.clone();
         fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
-        let model = Model::new(&fixed, &empty, &[], setting.substeps).ok()?;
+        let model = Model::new(&fixed, &empty, &[], substeps).ok()?;
         let y = model.predict(&model.theta(&Values::default()))?;
         let data = empty.with_outputs(y);
-        distance(rival, rival_values, &data, &[], setting.substeps, noise)
+        distance(rival, rival_values, &data, &[], substeps, noise)
     };
     let forth = one(&da, &a.whitener, &db, &b.values())?;
     let back = one(&db, &b.whitener, &da, &a.values())?;
     Some(forth.min(back))
+}
+
+/// The shape as it stands in a sentence.
+fn worded(shape: &str) -> String {
+    if shape == RECORDED || shape == "steps" { shape.to_owned() } else { format!("a {shape}") }
 }
 
 /// The experiment that would best separate two explanations.
@@ -174,8 +184,8 @@ pub fn propose(
     let (one, other) = (between[0].replace('_', " "), between[1].replace('_', " "));
     let sentence = if separable {
         format!(
-            "To tell {one} from {other}: a {} of {} times the recorded peak, {} to {} Hz, {} s long; expected squared separation {} (25 settles it), {} on this recording.",
-            trial.shape,
+            "To tell {one} from {other}: {} at {} times the recorded peak, {} to {} Hz, {} s long; expected squared separation {} (25 settles it), {} on this recording.",
+            worded(trial.shape),
             number(trial.level),
             number(trial.band[0]),
             number(trial.band[1]),

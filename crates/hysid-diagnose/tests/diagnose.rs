@@ -5,7 +5,7 @@ mod oscillator;
 
 use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose};
-use hysid_plant::Simulation;
+use hysid_plant::{Compiled, Drive, Run, Simulation};
 use hysid_signal::{Channel, Clock, Recording};
 use oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
 
@@ -44,6 +44,46 @@ fn nothing_is_missing_in_a_simulation_with_wrong_parameters() {
     assert!(d.augmented.is_none() && !d.file.mismatch.detectable.is_empty());
     let m = d.file.calibrated_parameters.iter().find(|p| p.name == "m").unwrap();
     assert!((m.value - 1.0).abs() < 0.03, "{m:?}");
+}
+
+/// A spring pulled to and fro, and what it answers with Dahl's friction beside it: 2 N, sliding after 7 mm, less than a sample's travel.
+fn pulled(name: &str, seed: u64, n: usize) -> Recording {
+    let mut random = normal(seed);
+    let phases: Vec<f64> = (0..8).map(|_| 3.0 * random()).collect();
+    let at = |t: f64| 0.05 * phases.iter().zip(1..).map(|(p, j)| (0.9 * f64::from(j) * t + p).cos()).sum::<f64>();
+    let (mut here, mut friction) = (at(0.0), 0.0);
+    let (mut x, mut f) = (Vec::new(), Vec::new());
+    for i in 0..n {
+        x.push(here);
+        f.push(40.0 * here + friction + 0.02 * random());
+        for s in 1..=40 {
+            let next = at((i as f64 + f64::from(s) / 40.0) * PERIOD);
+            let end = 2.0 * f64::signum(next - here);
+            friction = end + (friction - end) * (-f64::abs(next - here) / 0.007).exp();
+            here = next;
+        }
+    }
+    let channels = vec![Channel { name: "x_m".into(), samples: x }, Channel { name: "f_N".into(), samples: f }];
+    Recording::new(name, Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap()
+}
+
+#[test]
+fn a_static_simulation_is_stepped_finely_enough_for_the_memory_that_an_effect_adds() {
+    let text = "[time]\nperiod_s = 0.025\n[inputs]\nx = \"x_m\"\n[parameters]\nk = { value = 45.0, min = 1.0, max = 200.0, unit = \"N/m\" }\n[outputs]\nf_N = \"k*x\"\n";
+    let holdout = pulled("val.csv", 2, 900);
+    let d = run(text, &[pulled("est.csv", 1, 900)], &[holdout.clone()]).unwrap();
+    let families: Vec<&str> = d.file.effects.iter().map(|e| e.family.as_str()).collect();
+    assert_eq!(families, ["presliding"], "{}", d.file.summary);
+    // What is told of the hold-out holds in the simulation that is written, however finely that is integrated.
+    let compiled = Compiled::new(d.augmented.as_ref().unwrap()).unwrap();
+    assert!(!compiled.simulation().is_static(), "{}", d.file.summary);
+    let [x, f] = [&holdout.channels()[0].samples, &holdout.channels()[1].samples];
+    let drive = Drive::new(0.0, PERIOD, x.len(), vec![x.clone()]).unwrap();
+    let theta = compiled.theta();
+    let y = compiled.simulate(&Run::new(&drive, &theta).with_substeps(64)).outputs.swap_remove(0);
+    let fine = rms(&f.iter().zip(&y).map(|(a, b)| a - b).collect::<Vec<_>>());
+    let told = d.file.fit[0].rmse_after.unwrap();
+    assert!((told / fine - 1.0).abs() < 0.01, "told {told}, {fine} on fine steps: {}", d.file.summary);
 }
 
 #[test]
