@@ -189,7 +189,8 @@ impl Bank {
     }
 }
 
-fn build() -> anyhow::Result<PathBuf> {
+/// Builds `hysid` in release mode and returns its path.
+pub(crate) fn build() -> anyhow::Result<PathBuf> {
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .args(["build", "--release", "--quiet", "--package", "hysid-cli"])
         .current_dir(crate::root())

@@ -1,9 +1,11 @@
-//! `cargo xtask recordings`: identifies every public recording set with defaults and prints what the free run is worth.
+//! `cargo xtask recordings`: identifies every public recording set with defaults and prints what the free run is worth; then what
+//! `hysid diagnose` says of the baseline of each.
 //!
 //! Each set is used by its own split into estimation and validation; a run sees no validation data and has no setting for a set.
 //! (What the recipe's rules owe to these figures is told in `docs/recordings.md`.) Beside ours stands the linear model that is identified and refined the same way, and the figure that the
 //! set's `meta.json` quotes. Without the recordings the task says so and succeeds, unless `HYSID_REQUIRE_RECORDINGS=1`.
 
+mod diagnosis;
 mod page;
 mod sets;
 mod untouched;
@@ -31,6 +33,12 @@ pub struct Args {
     /// The check on data that nobody had looked at while the recipe was made.
     #[arg(long)]
     untouched: bool,
+    /// The folder of their baseline simulations.
+    #[arg(long, default_value = "../shared/simulations")]
+    simulations: PathBuf,
+    /// Only the diagnosis of the baselines, not the identification.
+    #[arg(long, conflicts_with_all = ["untouched", "halves"])]
+    diagnosis: bool,
     /// A recording (CSV) with columns `u` and `y`: identified on its first half, run on its second.
     #[arg(long)]
     halves: Option<PathBuf>,
@@ -69,6 +77,19 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         println!("skipped: no recordings at {}", args.dir.display());
         return Ok(());
     }
+    if !args.diagnosis {
+        identified(args, &page)?;
+    }
+    let table = diagnosis::table(&args.dir, &args.simulations, args.only.as_deref())?;
+    println!("\n{table}");
+    if args.only.is_none() {
+        page::write(&page, page::DIAGNOSED, &table)?;
+    }
+    Ok(())
+}
+
+/// The table of identified models, printed and written to the page.
+fn identified(args: &Args, page: &Path) -> anyhow::Result<()> {
     let mut lines = Vec::new();
     for set in SETS.iter().filter(|s| args.only.as_ref().is_none_or(|o| s.name.contains(o.as_str()))) {
         eprintln!("{}", set.name);
@@ -80,7 +101,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     println!("\n{}", page::table(&lines));
     if args.only.is_none() {
-        page::write(&page, page::FIT, &page::with_models(&lines)?)?;
+        page::write(page, page::FIT, &page::with_models(&lines)?)?;
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ const HEAD: &str = "| set | validation | ours | linear, same way | ratio | std o
                     |---|---|---:|---:|---:|---:|---:|:-:|---:|---:|---:|---|\n";
 /// The parts of the page that this task writes stand between these marks.
 pub(crate) const FIT: (&str, &str) = ("<!-- fit: begin -->", "<!-- fit: end -->");
+pub(crate) const DIAGNOSED: (&str, &str) = ("<!-- diagnosis: begin -->", "<!-- diagnosis: end -->");
 pub(crate) const UNTOUCHED: (&str, &str) = ("<!-- untouched: begin -->", "<!-- untouched: end -->");
 
 /// One line of the table.
