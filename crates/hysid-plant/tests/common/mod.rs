@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // each test binary uses a part
 
+pub mod equations;
+
 use std::path::PathBuf;
 
 /// The folder of shared recordings and simulations beside the checkout, if it is there.

@@ -1,86 +1,23 @@
 //! One case: what is concealed where, the recordings, and the label.
 
-use serde::Serialize;
+mod label;
+mod noisy;
+mod simulation;
 
+pub use label::{Concealed, Group, Label};
+pub use simulation::simulation;
+
+use self::label::concealed;
+use self::noisy::{add_noise, record};
 use crate::body::Kind;
 use crate::design::{Design, Source, suits};
 use crate::excite::Excitation;
-use crate::input::{Hold, Input};
+use crate::input::Input;
 use crate::law::{Effect, Law, Place};
 use crate::machine::Machine;
-use crate::noise::{Noise, convert, round_to};
+use crate::noise::{Noise, convert};
 use crate::seed::Random;
-use crate::strength::{Tuned, measure, spread, tune};
-
-/// What sort of case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, PartialOrd, Ord, Hash)]
-#[serde(rename_all = "snake_case")]
-pub enum Group {
-    /// Nothing is missing.
-    Control,
-    /// One effect of the catalogue.
-    Single,
-    /// Two effects of different families.
-    Pair,
-    /// Three effects of different families.
-    Triple,
-    /// One effect that the catalogue does not have.
-    Outside,
-}
-
-/// One concealed effect as the label tells it.
-#[derive(Debug, Clone, Serialize)]
-pub struct Concealed {
-    /// Mechanism.
-    pub mechanism: &'static str,
-    /// Family.
-    pub family: &'static str,
-    /// Slots that are right: the true one first, then those that no recording of this plant can tell from it.
-    pub slots: Vec<String>,
-    /// Mechanisms (with family) that are the same law on this plant.
-    pub same: Vec<(&'static str, &'static str)>,
-    /// Parameters by name.
-    pub parameters: Vec<(&'static str, f64)>,
-}
-
-/// The label of a case.
-#[derive(Debug, Clone, Serialize)]
-pub struct Label {
-    /// Name of the folder.
-    pub id: String,
-    /// Sort of case.
-    pub group: Group,
-    /// Plant.
-    pub plant: Kind,
-    /// Excitation of the estimation record.
-    pub excitation: Excitation,
-    /// Course of the command between samples.
-    pub hold: Hold,
-    /// Samples to estimate from.
-    pub samples: usize,
-    /// Sampling period in seconds.
-    pub period: f64,
-    /// Kind of noise.
-    pub noise: Noise,
-    /// Noise over rms of the output.
-    pub noise_level: f64,
-    /// Standard deviation of the noise on each output.
-    pub sigma: Vec<f64>,
-    /// Bits of the converter.
-    pub bits: u32,
-    /// Difficulty asked for; 0 for a control.
-    pub dnr_asked: f64,
-    /// Difficulty reached.
-    pub dnr: f64,
-    /// What is concealed.
-    pub effects: Vec<Concealed>,
-    /// True parameters of the plant.
-    pub theta: Vec<(&'static str, f64)>,
-    /// Parameters that the simulation file declares.
-    pub declared: Vec<(&'static str, f64)>,
-    /// Draws that were thrown away before this one.
-    pub rejected: usize,
-}
+use crate::strength::{Tuned, measure, tune};
 
 /// A recording: input, outputs with noise, outputs without.
 #[derive(Debug, Clone)]
@@ -292,164 +229,4 @@ fn companion(kind: Kind, have: &[Law], random: &mut Random) -> Option<Law> {
         .filter(|l| l.sociable() && suits(kind, *l) && !have.iter().any(|h| clash(*h, *l)))
         .collect();
     (!list.is_empty()).then(|| random.pick(&list))
-}
-
-/// A run of the true machine on a fresh source.
-fn record(design: &Design, machine: &Machine, source: &Source, noise: &[f64], tuned: &Tuned) -> Option<Record> {
-    let seen: Vec<f64> = noise.iter().map(|v| v * tuned.sigma[0]).collect();
-    let (input, clean) = design.run(machine, source, &seen)?;
-    clean.iter().flatten().all(|v| v.is_finite()).then(|| Record { input, y: clean.clone(), clean })
-}
-
-/// Adds noise of standard deviation `sigma`; what a controller has seen is what is recorded.
-fn add_noise(
-    record: &mut Record,
-    machine: &Machine,
-    kind: Noise,
-    sigma: &[f64],
-    seen: Option<&Vec<f64>>,
-    random: &mut Random,
-) -> Option<()> {
-    let n = record.input.len();
-    let process = kind == Noise::Process && seen.is_none() && matches!(record.input, Input::Held { .. });
-    if process {
-        // The unknown force is scaled so that it makes half of the noise power on the first output.
-        let force = Noise::Autoregressive.samples(random, n);
-        let mut size = 0.01 * spread_of_input(&record.input);
-        for _ in 0..4 {
-            let scaled: Vec<f64> = force.iter().map(|f| f * size).collect();
-            let y = machine.run(&record.input, Some(&scaled)).ok()?;
-            let off: Vec<f64> = y[0].iter().zip(&record.clean[0]).map(|(a, b)| a - b).collect();
-            let rms = (off.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt();
-            record.y = y;
-            let ratio = sigma[0] * 0.5_f64.sqrt() / rms.max(f64::MIN_POSITIVE);
-            if (ratio - 1.0).abs() < 0.03 {
-                break;
-            }
-            size *= ratio;
-        }
-    }
-    let share = if process { 0.5_f64.sqrt() } else { 1.0 };
-    for (channel, (column, s)) in record.y.iter_mut().zip(sigma).enumerate() {
-        let fresh;
-        let e = match (seen, channel) {
-            (Some(seen), 0) => seen,
-            _ => {
-                fresh = kind.samples(random, n);
-                &fresh
-            }
-        };
-        for (v, e) in column.iter_mut().zip(e) {
-            *v += share * s * e;
-        }
-        if kind == Noise::Quantised {
-            round_to(column, *s);
-        }
-    }
-    Some(())
-}
-
-fn spread_of_input(input: &Input) -> f64 {
-    match input {
-        Input::Held { values, .. } => spread(values),
-        Input::Motion { .. } => 1.0,
-    }
-}
-
-/// The label of an effect.
-fn concealed(design: &Design, e: &Effect) -> Concealed {
-    let kind = design.kind;
-    let input = format!("input:{}", kind.input_symbol());
-    let output = format!("output:{}", kind.outputs()[0]);
-    let plant = kind.plant_slot(e.dof);
-    let mut slots = vec![match e.law.place() {
-        Place::Input => input.clone(),
-        Place::Plant => plant.clone(),
-        Place::Parameter => format!("parameter:{}", kind.parameters()[e.theta]),
-        Place::Output => output.clone(),
-        Place::Disturbance => "disturbance".into(),
-    }];
-    let rubs = matches!(kind, Kind::Drive | Kind::ClosedDrive);
-    let linear = !matches!(kind, Kind::Drive | Kind::ClosedDrive | Kind::Pendulum | Kind::Wing);
-    // Linear time-invariant blocks commute: before or after a linear plant is the same thing.
-    let commutes = matches!(
-        e.law,
-        Law::Delay | Law::ActuatorLag | Law::SensorLag | Law::LogCreep | Law::InputOffset | Law::OutputOffset
-    );
-    if linear && commutes && !kind.prescribed() {
-        slots.extend([input.clone(), output]);
-    }
-    let forced = rubs && e.law == Law::AsymmetricFriction;
-    if forced || matches!(e.law, Law::InputOffset | Law::BackEmf) || (linear && e.law == Law::OutputOffset) {
-        slots.extend([input, plant]);
-    }
-    let mut unique: Vec<String> = Vec::new();
-    for s in slots {
-        if !unique.contains(&s) {
-            unique.push(s);
-        }
-    }
-    let same = match e.law {
-        // On a plant that slides with F_c sgn v, friction that differs by 2 F_a between the directions is F_c sgn v and the constant force
-        // F_a, sticking included: the same machine as with an offset of the command.
-        Law::AsymmetricFriction if rubs => vec![("input_offset", "bias")],
-        Law::InputOffset if rubs => vec![("asymmetric_friction", "dry_friction")],
-        // Dahl's law is Bouc and Wen's with gamma = 0 and n = 1.
-        Law::Dahl => vec![("bouc_wen", "hysteretic_spring")],
-        Law::SquareRootDamping => vec![("power_law_damping", "nonlinear_damping")],
-        Law::InputOffset if linear => vec![("output_offset", "bias")],
-        Law::OutputOffset if linear => vec![("input_offset", "bias")],
-        Law::ActuatorLag if linear => vec![("sensor_lag", "signal_path_lag")],
-        Law::SensorLag if linear => vec![("actuator_lag", "signal_path_lag")],
-        _ => Vec::new(),
-    };
-    Concealed {
-        mechanism: e.law.name(),
-        family: e.law.family(),
-        slots: unique,
-        same,
-        parameters: e.law.parameters().iter().copied().zip(e.p.iter().copied()).collect(),
-    }
-}
-
-/// The simulation file: what the user knows. Parameters stand at `declared`, dry friction is `sign` or (with a speed) `tanh`, the initial
-/// state is known to be zero or `"free"`.
-pub fn simulation(design: &Design, declared: &[f64], regularised: Option<f64>, initial: &str) -> String {
-    let kind = design.kind;
-    let mut text = String::from("title = \"Simulation to be judged\"\n\n[time]\ncolumn = \"t_s\"\n");
-    if design.hold == Hold::Zero && !kind.prescribed() {
-        text.push_str("hold = \"zero\"\n");
-    }
-    text.push_str("\n[inputs]\n");
-    for (symbol, column) in kind.inputs() {
-        text.push_str(&format!("{symbol} = \"{column}\"\n"));
-    }
-    text.push_str("\n[parameters]\n");
-    for ((name, unit), value) in kind.parameters().iter().zip(kind.units()).zip(declared) {
-        let (low, high) = match (kind, *name) {
-            (Kind::Wing, "a_0") => (-6.0, 4.0),
-            (Kind::Specimen, "F0") => {
-                let size = design.theta[1] * design.level;
-                (-2.0 * size, 2.0 * size)
-            }
-            _ => (value * 0.1, value * 10.0),
-        };
-        text.push_str(&format!(
-            "{name} = {{ value = {value:.6e}, min = {low:.4e}, max = {high:.4e}, unit = \"{unit}\" }}\n"
-        ));
-    }
-    let speed = if matches!(kind, Kind::Drive | Kind::ClosedDrive | Kind::Pendulum) { "w" } else { "v" };
-    let friction = regularised.map_or_else(|| format!("sign({speed})"), |v| format!("tanh({speed}/{v:.6e})"));
-    let states = kind.states(&friction);
-    if !states.is_empty() {
-        text.push_str("\n[states]\n");
-        for (symbol, derivative) in states {
-            text.push_str(&format!("{symbol} = {{ derivative = \"{derivative}\", initial = {initial} }}\n"));
-        }
-    }
-    text.push_str("\n[outputs]\n");
-    for (column, expression) in kind.outputs().iter().zip(kind.output_expressions()).take(design.channels) {
-        text.push_str(&format!("{column} = \"{expression}\"\n"));
-    }
-    text
 }

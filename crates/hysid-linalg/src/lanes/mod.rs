@@ -6,6 +6,12 @@
 //! The same source is compiled for AVX-512, for AVX2 with FMA and for the baseline, and chosen at run time. Results differ
 //! in the last bits between such machines (fused against separate rounding), never between numbers of threads.
 
+mod form;
+
+#[cfg(target_arch = "x86_64")]
+use self::form::x86;
+use self::form::{Form, Plain};
+
 /// Samples in a [`Lane`].
 pub const LANE: usize = 8;
 
@@ -141,139 +147,6 @@ pub fn multiply(a: &[Lane], b: &[f64], out: &mut [Lane], machine: Machine) {
 fn multiply_wide(a: &[Lane], b: &[f64], out: &mut [Lane]) {
     // SAFETY: this function has the features that the form needs.
     unsafe { multiply_in::<x86::Wide>(a, b, out) }
-}
-
-/// Arithmetic on a lane in registers of one kind of processor.
-///
-/// # Safety
-/// The functions may only run, inlined, inside a function that has the processor features of the form.
-trait Form {
-    /// A lane in registers.
-    type V: Copy;
-    /// Columns in a register block of eight, four, two rows, and of one; zero rules a number of rows out.
-    const BLOCK: [usize; 4];
-    unsafe fn load(from: &Lane) -> Self::V;
-    /// Eight doubles from anywhere; they must be readable.
-    unsafe fn load_any(from: *const f64) -> Self::V;
-    unsafe fn store(v: Self::V, to: &mut Lane);
-    unsafe fn mul(a: Self::V, b: Self::V) -> Self::V;
-    unsafe fn add(a: Self::V, b: Self::V) -> Self::V;
-    unsafe fn mul_add(a: Self::V, b: Self::V, c: Self::V) -> Self::V;
-}
-
-/// What the compiler makes of it.
-struct Plain;
-
-impl Form for Plain {
-    type V = Lane;
-    const BLOCK: [usize; 4] = [0, 1, 2, 2];
-    #[inline(always)]
-    unsafe fn load(from: &Lane) -> Lane {
-        *from
-    }
-    #[inline(always)]
-    unsafe fn load_any(from: *const f64) -> Lane {
-        // SAFETY: the caller's; an array of doubles needs no more alignment than a double.
-        Lane(unsafe { *from.cast::<[f64; LANE]>() })
-    }
-    #[inline(always)]
-    unsafe fn store(v: Lane, to: &mut Lane) {
-        *to = v;
-    }
-    #[inline(always)]
-    unsafe fn mul(a: Lane, b: Lane) -> Lane {
-        Lane(std::array::from_fn(|e| a.0[e] * b.0[e]))
-    }
-    #[inline(always)]
-    unsafe fn add(a: Lane, b: Lane) -> Lane {
-        Lane(std::array::from_fn(|e| a.0[e] + b.0[e]))
-    }
-    #[inline(always)]
-    unsafe fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
-        Lane(std::array::from_fn(|e| a.0[e] * b.0[e] + c.0[e]))
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-mod x86 {
-    //! The forms for x86-64.
-
-    use std::arch::x86_64::*;
-
-    use super::{Form, Lane};
-
-    pub struct Wide;
-
-    impl Form for Wide {
-        type V = __m512d;
-        const BLOCK: [usize; 4] = [3, 6, 8, 8];
-        #[inline(always)]
-        unsafe fn load(from: &Lane) -> __m512d {
-            // SAFETY: a lane is 64 bytes, aligned to 64.
-            unsafe { _mm512_load_pd(from.0.as_ptr()) }
-        }
-        #[inline(always)]
-        unsafe fn load_any(from: *const f64) -> __m512d {
-            // SAFETY: the caller's.
-            unsafe { _mm512_loadu_pd(from) }
-        }
-        #[inline(always)]
-        unsafe fn store(v: __m512d, to: &mut Lane) {
-            // SAFETY: as for `load`.
-            unsafe { _mm512_store_pd(to.0.as_mut_ptr(), v) }
-        }
-        #[inline(always)]
-        unsafe fn mul(a: __m512d, b: __m512d) -> __m512d {
-            unsafe { _mm512_mul_pd(a, b) }
-        }
-        #[inline(always)]
-        unsafe fn add(a: __m512d, b: __m512d) -> __m512d {
-            unsafe { _mm512_add_pd(a, b) }
-        }
-        #[inline(always)]
-        unsafe fn mul_add(a: __m512d, b: __m512d, c: __m512d) -> __m512d {
-            unsafe { _mm512_fmadd_pd(a, b, c) }
-        }
-    }
-
-    pub struct Fused;
-
-    impl Form for Fused {
-        type V = (__m256d, __m256d);
-        const BLOCK: [usize; 4] = [0, 1, 2, 4];
-        #[inline(always)]
-        unsafe fn load(from: &Lane) -> Self::V {
-            let p = from.0.as_ptr();
-            // SAFETY: a lane is eight doubles, aligned to 64.
-            unsafe { (_mm256_load_pd(p), _mm256_load_pd(p.add(4))) }
-        }
-        #[inline(always)]
-        unsafe fn load_any(from: *const f64) -> Self::V {
-            // SAFETY: the caller's.
-            unsafe { (_mm256_loadu_pd(from), _mm256_loadu_pd(from.add(4))) }
-        }
-        #[inline(always)]
-        unsafe fn store(v: Self::V, to: &mut Lane) {
-            let p = to.0.as_mut_ptr();
-            // SAFETY: as for `load`.
-            unsafe {
-                _mm256_store_pd(p, v.0);
-                _mm256_store_pd(p.add(4), v.1);
-            }
-        }
-        #[inline(always)]
-        unsafe fn mul(a: Self::V, b: Self::V) -> Self::V {
-            unsafe { (_mm256_mul_pd(a.0, b.0), _mm256_mul_pd(a.1, b.1)) }
-        }
-        #[inline(always)]
-        unsafe fn add(a: Self::V, b: Self::V) -> Self::V {
-            unsafe { (_mm256_add_pd(a.0, b.0), _mm256_add_pd(a.1, b.1)) }
-        }
-        #[inline(always)]
-        unsafe fn mul_add(a: Self::V, b: Self::V, c: Self::V) -> Self::V {
-            unsafe { (_mm256_fmadd_pd(a.0, b.0, c.0), _mm256_fmadd_pd(a.1, b.1, c.1)) }
-        }
-    }
 }
 
 /// # Safety
