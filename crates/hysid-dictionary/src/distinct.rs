@@ -178,7 +178,8 @@ impl Kernel {
             };
             index.insert(factors, series.len());
             series.push(Series { source, most, least, at: len });
-            len += TILE + most - least;
+            // Series that begin alike with respect to cache lines multiply faster.
+            len += (TILE + most - least).next_multiple_of(LANE);
         }
         // Heads, shorter ones first; each with its tails.
         let mut by_head: BTreeMap<(usize, Vec<Factor>), Vec<(u32, u32)>> = BTreeMap::new();
