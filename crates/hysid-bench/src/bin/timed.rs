@@ -142,7 +142,7 @@ fn scaling(rounds: usize) -> Result<String, Box<dyn Error>> {
     let samples = [10_000, 31_623, 100_000, 316_228, 1_000_000];
     let axes: [(&str, Vec<Point>); 3] = [
         ("N", samples.iter().map(|&n| (n, n, 5, 15)).collect()),
-        ("M", [2, 3, 4, 5, 6, 7, 8, 9, 10].iter().map(|&lags| (dictionary(lags).len(), 20_000, lags, 15)).collect()),
+        ("M", [3, 5, 8, 12, 16, 20].iter().map(|&lags| (dictionary(lags).len(), 20_000, lags, 15)).collect()),
         ("n", [4, 8, 16, 32, 64].iter().map(|&terms| (terms, 20_000, 5, terms)).collect()),
     ];
     let (u, y) = known_system(1_000_000, 1, 0.01);
