@@ -62,17 +62,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if args.guard {
         return guard::run(&shell, &root, args.store);
     }
-    if args.cases == ["stream"] {
-        cmd!(shell, "cargo build --release --quiet -p hysid-cli").run()?;
-        return stream::run(&shell, &root);
-    }
     let known: Vec<case::Case> =
         [selection::cases(), simulation::cases(), diagnosis::cases()].into_iter().flatten().collect();
-    if let Some(odd) = args.cases.iter().find(|c| known.iter().all(|k| k.name != **c)) {
+    let alone = args.cases == ["stream"];
+    if let Some(odd) = args.cases.iter().find(|c| !alone && known.iter().all(|k| k.name != **c)) {
         let names: Vec<&str> = known.iter().map(|k| k.name).collect();
-        anyhow::bail!("there is no case `{odd}`; there are {}", names.join(", "));
+        anyhow::bail!("there is no case `{odd}`; there are {}, and `stream` alone", names.join(", "));
     }
-    cmd!(shell, "cargo build --release --quiet -p hysid-cli -p hysid-bench").run()?;
+    // The whole workspace: a build of some packages alone has other features and would compile everything anew.
+    cmd!(shell, "cargo build --release --quiet --bins --workspace").run()?;
+    if alone {
+        return stream::run(&shell, &root);
+    }
     if args.criterion {
         cmd!(shell, "cargo bench --quiet -p hysid-bench").run()?;
     }
