@@ -1,8 +1,9 @@
 //! Numbers in text, read at the speed of a large file, to the same bits as the standard library reads them.
 //!
-//! A number of up to 19 digits that is w 10^e with w up to 2^53 and |e| up to 22 is one exact product or quotient of two doubles
-//! (Clinger, "How to read floating point numbers accurately", PLDI 1990); every other number goes to the standard library. What is not
-//! plainly a number is left to [`parse`], which judges it.
+//! A number of up to 19 digits is w 10^e. With w up to 2^53 and |e| up to 22 it is one exact product or quotient of two doubles
+//! (Clinger, "How to read floating point numbers accurately", PLDI 1990); with -e up to 27 it is a quotient of two 64-bit numbers and a
+//! power of two, which is rounded once ([`quotient`]); every other number goes to the standard library. What is not plainly a number is
+//! left to [`parse`], which judges it.
 
 use crate::error::InputProblem;
 use crate::read::LARGEST_VALUE;
@@ -22,6 +23,16 @@ const POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
     1e21, 1e22,
 ];
+/// Powers of five that fit a `u64`.
+const FIVES: [u64; 28] = {
+    let mut fives = [1; 28];
+    let mut i = 1;
+    while i < 28 {
+        fives[i] = 5 * fives[i - 1];
+        i += 1;
+    }
+    fives
+};
 /// Up to here every whole number is a double.
 const EXACT: u64 = 1 << 53;
 /// Digits that fit a `u64` whatever they are.
@@ -64,14 +75,35 @@ pub(crate) fn leading(text: &[u8]) -> Option<Found> {
             decimals = ROUNDED_NOWHERE;
         }
     }
-    let value = if count <= DIGITS && w <= EXACT && exponent.unsigned_abs() <= 22 {
-        let power = POWERS[exponent.unsigned_abs() as usize];
-        let size = if exponent < 0 { w as f64 / power } else { w as f64 * power };
-        if negative { -size } else { size }
-    } else {
-        std::str::from_utf8(&text[..at]).ok()?.parse().ok()?
+    let places = exponent.unsigned_abs() as usize;
+    let size = match (POWERS.get(places), FIVES.get(places)) {
+        (Some(power), _) if count <= DIGITS && w <= EXACT => {
+            Some(if exponent < 0 { w as f64 / power } else { w as f64 * power })
+        }
+        (_, Some(&five)) if count <= DIGITS && exponent < 0 && w > 0 => Some(quotient(w, five, places as i64)),
+        _ => None,
+    };
+    let value = match size {
+        Some(size) if negative => -size,
+        Some(size) => size,
+        None => std::str::from_utf8(&text[..at]).ok()?.parse().ok()?,
     };
     (value.abs() <= LARGEST_VALUE).then_some(Found { value, len: at, decimals })
+}
+
+/// w / (five 2^places), correctly rounded; neither is 0.
+///
+/// Both are shifted up to 64 bits, so that the quotient of one, 63 bits further up, and the other has 63 or 64 bits: ten more than a
+/// double. A remainder is noted in its last bit, and the conversion rounds the whole.
+#[inline]
+fn quotient(w: u64, five: u64, places: i64) -> f64 {
+    let (up, by) = (w.leading_zeros(), five.leading_zeros());
+    let (top, bottom) = (u128::from(w << up) << 63, u128::from(five << by));
+    let (whole, rest) = (top / bottom, top % bottom);
+    let bits = whole as u64 | u64::from(rest != 0);
+    // A power of two well inside the range of normal doubles, so that the product is exact.
+    let exponent = 1023 - 63 + i64::from(by) - i64::from(up) - places;
+    bits as f64 * f64::from_bits((exponent as u64) << 52)
 }
 
 /// Takes the digits at `at` into `w` (which wraps when there are too many) and moves on behind them.
@@ -186,6 +218,15 @@ mod tests {
             "0.1",
             "0.30000000000000004",
             "1.000000000000000000e+00",
+            "0.999999999999999999",
+            "9999999999999999999e-27",
+            "1e-27",
+            "9007199254740993e-1",
+            "0.5000000000000000001",
+            "1.5000000000000002e-9",
+            "18014398509481985e-1",
+            "-9007199254740993.5",
+            "0.000000000000000000",
         ] {
             check(number);
         }
@@ -196,13 +237,20 @@ mod tests {
 
     proptest! {
         #[test]
-        fn shortest_and_fixed_forms_are_read_exactly(bits in any::<u64>(), x in -1e3..1e3_f64, places in 0..25_usize) {
+        fn shortest_and_fixed_forms_are_read_exactly(bits in any::<u64>(), x in -1e3..1e3_f64, places in 0..30_usize, digits in any::<u64>()) {
             let any = f64::from_bits(bits);
             prop_assume!(any.is_finite());
             check(&format!("{any:e}"));
             check(&format!("{any:.17e}"));
             check(&x.to_string());
             check(&format!("{x:.places$}"));
+            check(&format!("{digits}e-{places}"));
+            // Half way between two doubles, where rounding is to the even one, and its neighbours.
+            let half = 2 * (digits >> 11) + 1;
+            for near in [half - 1, half, half + 1] {
+                check(&format!("{}e-{}", 5 * near, places % 4));
+                check(&(5 * near).to_string());
+            }
         }
     }
 }
