@@ -108,27 +108,16 @@ fn measure(shell: &Shell, root: &Path, file: &Path, terms: &[(f64, Term)]) -> an
         let wall = began.elapsed().as_secs_f64();
         writeln!(text, "| {name} | 1 | {wall:.2} | {:.0} | | | | |", BYTES as f64 / 1e6 / wall)?;
     }
-    let base = [
-        "--recording",
-        "--input",
-        "u",
-        "--output",
-        "y",
-        "--lags-output",
-        "5",
-        "--lags-input",
-        "5",
-        "--json",
-        "--timing",
-    ];
+    let base = ["--input", "u", "--output", "y", "--json", "--timing"];
     for (name, options) in [
-        ("parsing alone", &["--read-only"][..]),
-        ("select 15 of 286", &["--terms", "15", "--search", "greedy"]),
-        ("default search, size left to the data", &[]),
+        ("parsing alone", "--read-only"),
+        ("select 11 of 84", "--lags-output 3 --lags-input 3 --terms 11 --search greedy"),
+        ("select 15 of 286", "--lags-output 5 --lags-input 5 --terms 15 --search greedy"),
+        ("size left to the data, of 286", "--lags-output 5 --lags-input 5"),
     ] {
         for threads in ["1", "2"] {
-            let (first, rest) = (base[0], &base[1..]);
-            let output = cmd!(shell, "{program} select {first} {file} {rest...} --threads {threads} {options...}")
+            let options = options.split_whitespace();
+            let output = cmd!(shell, "{program} select --recording {file} {base...} --threads {threads} {options...}")
                 .quiet()
                 .read()?;
             let value: Value = serde_json::from_str(&output)?;
