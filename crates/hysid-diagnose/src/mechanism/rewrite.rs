@@ -154,6 +154,12 @@ fn product_of_units(slot: &Slot, measure: &Expr) -> Option<Unit> {
     }
 }
 
+/// The unit that a reported quantity is told in. What a law measures in turns per time is a frequency: `Hz`, not `1/s`.
+fn unit_told(slot: &Slot, measure: &str) -> Option<Unit> {
+    let unit = unit_of_measure(slot, &Expr::parse(measure).ok()?)?;
+    if measure == "1/t" && unit.to_string() == "1/s" { Unit::parse("Hz").ok() } else { Some(unit) }
+}
+
 /// The law's text at its target.
 fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Writer<'_>) -> Result<(), String> {
     match (&slot.target, change) {
@@ -338,11 +344,11 @@ fn write_law(
     let mut report = Vec::new();
     for parameter in law.parameters.iter().filter(|p| p.reported) {
         let value = writer.text(&parameter.name)?;
-        let unit = Expr::parse(&parameter.measure).ok().and_then(|m| unit_of_measure(slot, &m));
+        let unit = unit_told(slot, &parameter.measure);
         report.push(Reported { name: parameter.name.clone(), unit, value });
     }
     for derived in &law.derived {
-        let unit = Expr::parse(&derived.measure).ok().and_then(|m| unit_of_measure(slot, &m));
+        let unit = unit_told(slot, &derived.measure);
         report.push(Reported { name: derived.name.clone(), unit, value: writer.text(&derived.value)? });
     }
     if law.never_baseline {
