@@ -65,6 +65,19 @@ impl<'a, E: Evidence + ?Sized> Moments<'a, E> {
         }
     }
 
+    /// Makes of column `j` only what it shares with `chosen`, whose columns are there; elsewhere it is 0. No pass over the samples.
+    pub fn make_among(&mut self, j: usize, chosen: &[usize]) {
+        if self.has(j) {
+            return;
+        }
+        let mut column = vec![0.0; self.len()];
+        column[j] = if self.is_zero(j) { 0.0 } else { 1.0 };
+        for &k in chosen {
+            column[k] = self.column(k).get(j).copied().unwrap_or(0.0);
+        }
+        self.gram.insert(j, column);
+    }
+
     /// Column `j` of the matrix of cosines; empty when it was not made.
     pub fn column(&self, j: usize) -> &[f64] {
         self.gram.get(&j).map_or(&[], Vec::as_slice)

@@ -99,9 +99,12 @@ pub(crate) fn from_samples<C: Columns + ?Sized>(
     let (n, rows) = (columns.len(), phi.rows());
     let r = factor(phi, y, columns);
     let press = sum_over_blocks(rows, n, rows * n * n, |range, sums| {
-        rotate(phi, y, columns, &r, range, |k, _, e, free| {
-            sums[k] = leave_one_out_sum(e, free, FULL_LEVERAGE);
-        });
+        // In tiles that stay in the first-level cache with all columns.
+        for at in range.clone().step_by(TILE) {
+            rotate(phi, y, columns, &r, at..(at + TILE).min(range.end), |k, _, e, free| {
+                sums[k] += leave_one_out_sum(e, free, FULL_LEVERAGE);
+            });
+        }
     });
     let press = press.iter().map(|p| p / energy).collect();
     let blocks = match goal {

@@ -147,6 +147,12 @@ fn grow<E: Evidence + ?Sized>(
                 }
             },
         };
+        if step + 1 == longest && report.is_some() && options.search == Search::Greedy {
+            // Nothing is chosen after the last term: what it shares with the other candidates is not asked for.
+            moments.make_among(next, &factor.chosen);
+            factor.add(next, moments.column(next));
+            break;
+        }
         moments.make(next, ranked.iter().copied());
         factor.add(next, moments.column(next));
         let Some(table) = report.as_deref_mut() else { continue };

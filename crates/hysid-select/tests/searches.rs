@@ -205,3 +205,21 @@ fn matching_pursuit_on_the_papers_dictionary_gives_the_papers_terms() {
         }
     }
 }
+
+/// A greedy path asks nothing of the data for its last term that it does not need; a longer path must begin with it.
+#[test]
+fn a_greedy_path_is_the_beginning_of_the_next_longer_one() {
+    let (phi, y) = problem(5, 60, 14);
+    let path = |terms: usize| {
+        let options = Options { search: Search::Greedy, criterion: Criterion::Terms(terms), ..Options::default() };
+        select(&phi, &y, &options).unwrap()
+    };
+    for terms in 1..12 {
+        let (shorter, longer) = (path(terms), path(terms + 1));
+        assert_eq!(shorter.terms, longer.terms[..terms], "{terms}");
+        for (a, b) in shorter.steps.iter().zip(&longer.steps) {
+            assert!((a.err - b.err).abs() < 1e-12 && (a.press / b.press - 1.0).abs() < 1e-9, "{terms}: {a:?} {b:?}");
+        }
+        assert!(shorter.precision.err_deviation < 1e-9, "{terms}: {:?}", shorter.precision);
+    }
+}
