@@ -70,33 +70,60 @@ fn a_file_read_once_gives_what_memory_gives() {
             writeln!(text, "{:.2},{},{},{y}", 0.01 * k as f64, u[k], v[k]).unwrap();
         }
         std::fs::write(&file, text).unwrap();
-        let recording = hysid_io::read_recording(&file, &hysid_io::ReadOptions::columns(["u", "v", "y"])).unwrap();
-        let samples = |c: usize| recording.channels()[c].samples.as_slice();
-        let dictionary = Spec::narx(Signals::from_columns("y", &["u", "v"]).unwrap(), 2, delay..=2, 3).build().unwrap();
-        let design = Design::new(&dictionary, &[Record::new(samples(2), vec![samples(0), samples(1)])]).unwrap();
-        let options = Options { search: Search::Greedy, criterion: Criterion::Terms(12), ..Options::default() };
-        let expected = select(&design, &design.target(), &options).unwrap();
-        let delay = delay.to_string();
-        let args =
-            ["select", "--recording", "r.csv", "--input", "u", "--input", "v", "--output", "y", "--lags-output", "2"];
-        let more = ["--lags-input", "2", "--input-delay", &delay, "--terms", "12", "--search", "greedy", "--json"];
-        let (status, out, err) = run(&[&args[..], &more[..]].concat(), dir.path());
-        assert_eq!((status, err.as_str()), (0, ""), "{name}");
-        let found: Value = serde_json::from_str(&out).unwrap();
-        let terms = found["terms"].as_array().unwrap();
-        let texts: Vec<&str> = terms.iter().filter_map(|t| t["term"].as_str()).collect();
-        assert_eq!(texts, expected.terms.iter().map(|&j| dictionary.text(j)).collect::<Vec<_>>(), "{name}");
-        for (k, term) in terms.iter().enumerate() {
-            let (theta, error) = (term["theta"].as_f64().unwrap(), term["standard_error"].as_f64().unwrap());
-            assert!((theta / expected.theta[k] - 1.0).abs() < 1e-9, "{name}: {theta} {}", expected.theta[k]);
-            assert!((error / expected.standard_errors()[k] - 1.0).abs() < 1e-9, "{name}");
-        }
-        assert_eq!(found["samples"], expected.samples);
+        let found = agree(&file, name, &["u", "v"], "y", &delay.to_string(), 12);
         assert_eq!(found["period_s"], 0.01);
-        for threads in ["1", "2", "3"] {
-            let again = run(&[&args[..], &more[..], &["--threads", threads]].concat(), dir.path());
-            assert_eq!(again.1, out, "{name}: {threads} threads");
-        }
+    }
+}
+
+/// What `hysid select` finds with lags up to 2, compared with the selection from the recording in memory; the same for any number of threads.
+fn agree(file: &Path, name: &str, inputs: &[&str], output: &str, delay: &str, terms: usize) -> Value {
+    let columns = inputs.iter().copied().chain([output]);
+    let recording = hysid_io::read_recording(file, &hysid_io::ReadOptions::columns(columns)).unwrap();
+    let samples: Vec<&[f64]> = recording.channels().iter().map(|c| c.samples.as_slice()).collect();
+    let signals = Signals::from_columns(output, inputs).unwrap();
+    let dictionary = Spec::narx(signals, 2, delay.parse().unwrap()..=2, 3).build().unwrap();
+    let (y, u) = samples.split_last().unwrap();
+    let design = Design::new(&dictionary, &[Record::new(y, u.to_vec())]).unwrap();
+    let options = Options { search: Search::Greedy, criterion: Criterion::Terms(terms), ..Options::default() };
+    let expected = select(&design, &design.target(), &options).unwrap();
+    let count = terms.to_string();
+    let mut args = vec!["select", "--recording", file.to_str().unwrap(), "--output", output, "--input-delay", delay];
+    inputs.iter().for_each(|u| args.extend(["--input", u]));
+    args.extend(["--lags-output", "2", "--lags-input", "2", "--terms", &count, "--search", "greedy", "--json"]);
+    let (status, out, err) = run(&args, Path::new("."));
+    assert_eq!((status, err.as_str()), (0, ""), "{name}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let terms = found["terms"].as_array().unwrap();
+    let texts: Vec<&str> = terms.iter().filter_map(|t| t["term"].as_str()).collect();
+    assert_eq!(texts, expected.terms.iter().map(|&j| dictionary.text(j)).collect::<Vec<_>>(), "{name}");
+    for (k, term) in terms.iter().enumerate() {
+        let (theta, error) = (term["theta"].as_f64().unwrap(), term["standard_error"].as_f64().unwrap());
+        assert!((theta / expected.theta[k] - 1.0).abs() < 1e-9, "{name}: {theta} {}", expected.theta[k]);
+        assert!((error / expected.standard_errors()[k] - 1.0).abs() < 1e-9, "{name}");
+    }
+    assert_eq!(found["samples"], expected.samples);
+    for threads in ["1", "2", "3"] {
+        let again = run(&[&args[..], &["--threads", threads]].concat(), Path::new("."));
+        assert_eq!(again.1, out, "{name}: {threads} threads");
+    }
+    found
+}
+
+#[test]
+fn real_recordings_read_once_give_what_memory_gives() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/recordings");
+    if !root.is_dir() {
+        assert!(std::env::var_os("HYSID_REQUIRE_RECORDINGS").is_none(), "the recordings are needed but not there");
+        println!("skipped: no recordings");
+        return;
+    }
+    for (file, input, output) in [
+        ("silverbox/silverbox_validation_arrow.csv", "u_V", "y_V"),
+        ("wiener_hammerstein/wh_validation.csv", "u_V", "y_V"),
+        ("boucwen_benchmark_simulated/boucwen_validation_multisine.csv", "u_N", "y_mm"),
+        ("mr_damper_utfpr/mr_exp1.csv", "v_mm_s", "F_N"),
+    ] {
+        agree(&root.join(file), file, &[input], output, "0", 8);
     }
 }
 
