@@ -5,7 +5,8 @@
 //! sample each is at rest: play in the middle of its band, lag settled, delay filled with the first value, relay at -1
 //! unless its argument is above the upper threshold.
 //!
-//! - `lag` is exact for an argument that is linear between commits (so for every input, held or linear).
+//! - `lag` is exact for an argument that is linear between commits (so for every input, held or linear); within a
+//!   step a derivative sees what makes the step's integrals exact, however short the time constant.
 //! - `delay` of inputs is linear between samples; under a zero-order hold a derivative sees the mean of the held signal over
 //!   the step, so that the response moves smoothly with the delay. `delay` of a state interpolates what was committed, by a
 //!   cubic where the neighbours are evenly spread.
@@ -36,6 +37,15 @@ impl<S> Moment<S> {
         S: Span<N>,
     {
         self.tau.line(self.sample_s, 1.0)
+    }
+
+    /// Whether this is the middle stage of a step.
+    fn midway<N>(&self) -> bool
+    where
+        S: Span<N>,
+    {
+        let (since, step) = (self.since.value(), self.step.value());
+        step > 0.0 && (2.0 * since - step).abs() <= 1e-9 * step
     }
 }
 
@@ -75,6 +85,18 @@ impl<N: Number> Decay<N> {
         // Below a thousandth of the time gone the exponential is zero; the time constant then acts by the slope alone.
         let decay = length.div(tau.max(length.scale(1e-3))).neg().call(Function::Exp);
         Self { since: since.value(), ratio: tau.div(length), decay }
+    }
+
+    /// What the first and the middle stages of a Runge-Kutta step of this length see of the difference, so that the step integrates it
+    /// exactly, once and twice. A lag shorter than the step has a transient that passes between the stages; with its values there the
+    /// response would not move with the time constant.
+    fn seen(&self) -> (N, N) {
+        // Beyond, the differences below would be rounding.
+        let ratio = self.ratio.min(N::lift(1e5));
+        let once = ratio.mul(N::lift(1.0).sub(self.decay));
+        let twice = ratio.mul(N::lift(1.0).sub(once));
+        let middle = once.scale(3.0).sub(twice.scale(3.0)).sub(self.decay.scale(0.5));
+        (twice.scale(6.0).sub(middle.scale(2.0)), middle)
     }
 }
 
@@ -180,11 +202,15 @@ impl<N: Number> Cell<N> {
             self.argument = w;
         }
         let tau = tau.max(N::lift(0.0));
-        let value = if moment.since.value() > 0.0 {
+        let (since, step) = (moment.since.value(), moment.step.value());
+        let value = if since > 0.0 {
             let gone = self.decay(moment.since, tau);
             let slope_tau = w.sub(self.argument).mul(gone.ratio);
             let start = self.held.sub(self.argument).add(slope_tau);
-            w.sub(slope_tau).add(start.mul(gone.decay))
+            let left = if moment.midway() { self.decay(moment.step, tau).seen().1 } else { gone.decay };
+            w.sub(slope_tau).add(start.mul(left))
+        } else if step > 0.0 {
+            w.add(self.held.sub(w).mul(self.decay(moment.step, tau).seen().0))
         } else {
             self.held.where_positive(tau, w)
         };
