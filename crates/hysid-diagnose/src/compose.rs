@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::fitting::{Part, assemble, complete, refit_all, without};
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::joint::pairs;
+use crate::mechanism::Mechanism;
 use crate::screen::{Candidate, screen};
 
 /// The candidates worth a refit: the best by score, at most `most`, and one for each slot and family that is not far behind.
@@ -21,17 +22,18 @@ pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
     // Siblings of the best must be heard: the verdict turns on them.
     if let Some(best) = candidates.first() {
         for c in candidates {
-            let rival = (c.mechanism.family == best.mechanism.family
-                || best.mechanism.contains.contains(&c.mechanism.id)
-                || best.mechanism.confusable.contains(&c.mechanism.id)
-                || c.mechanism.contains.contains(&best.mechanism.id))
-                && c.slot.label == best.slot.label;
+            let rival = rivals(best.mechanism, c.mechanism) && c.slot.label == best.slot.label;
             if rival && !list.iter().any(|l| std::ptr::eq(*l, c)) {
                 list.push(c);
             }
         }
     }
     list
+}
+
+/// Whether two mechanisms at one slot are easily taken for each other.
+fn rivals(a: &Mechanism, b: &Mechanism) -> bool {
+    a.family == b.family || a.contains.contains(&b.id) || a.confusable.contains(&b.id) || b.contains.contains(&a.id)
 }
 
 /// How a search is bounded.
@@ -95,10 +97,10 @@ pub fn compose<'d>(
             return;
         }
         // Where nothing significant is left there is nothing to add.
-        if best_of(pool).is_none_or(|b| pool[b].effects.len() + 1 < depth || !unexplained(&pool[b])) {
+        if best_below(pool, depth).is_none_or(|b| pool[b].effects.len() + 1 < depth || !unexplained(&pool[b])) {
             break;
         }
-        let best = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        let best = best_below(pool, depth).map_or(f64::NEG_INFINITY, |b| pool[b].log_evidence);
         let parents = beam(pool, depth - 1, options.beam);
         let mut found = Vec::new();
         if depth == 2 {
@@ -157,7 +159,7 @@ fn extended<'d>(
     }
     let mut list = short_list(&candidates, options.most);
     let sibling = |c: &&Candidate| {
-        dropped.is_some_and(|d| d.mechanism.family == c.mechanism.family && d.slot.label == c.slot.label)
+        dropped.is_some_and(|d| rivals(d.mechanism, c.mechanism) && d.slot.label == c.slot.label)
             && !list.iter().any(|l| std::ptr::eq(*l, *c))
     };
     let more: Vec<&Candidate> = candidates.iter().filter(sibling).collect();
@@ -180,7 +182,12 @@ pub fn add<'d>(pool: &mut Vec<Hypothesis<'d>>, h: Hypothesis<'d>) {
 
 /// The set that stands: most evidence, where each further effect must have added [`LEAST_GAIN`].
 pub fn best_of(pool: &[Hypothesis<'_>]) -> Option<usize> {
-    let most = pool.iter().map(|h| h.effects.len()).max()?;
+    best_below(pool, usize::MAX)
+}
+
+/// The set that stands among those of fewer effects than this.
+fn best_below(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
+    let most = pool.iter().map(|h| h.effects.len()).filter(|&n| n < effects).max()?;
     let mut standing: Option<usize> = None;
     for size in 0..=most {
         let of_size = (0..pool.len())

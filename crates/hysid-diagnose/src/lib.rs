@@ -2,7 +2,8 @@
 
 pub mod evidence;
 pub mod file;
-pub mod locate;
+pub mod left;
+mod locate;
 pub mod mechanism;
 pub mod picture;
 pub mod refit;
@@ -18,6 +19,7 @@ mod data;
 mod draw;
 mod error;
 mod experiment;
+mod firmness;
 mod fitting;
 mod hold;
 mod hypothesis;
@@ -32,6 +34,7 @@ mod region;
 mod report_values;
 mod screen;
 mod search;
+mod second_look;
 mod text;
 mod thinning;
 mod weigh;

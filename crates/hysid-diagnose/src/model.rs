@@ -325,7 +325,10 @@ impl<'d> Model<'d> {
             let directions: Vec<Direction<'_>> = signals
                 .iter()
                 .map(|(place, series)| {
-                    crate::openset::direction(*place, series.get(s).map(Vec::as_slice).unwrap_or_default())
+                    Direction::Injection(hysid_plant::Injection {
+                        slot: *place,
+                        series: series.get(s).map(Vec::as_slice).unwrap_or_default(),
+                    })
                 })
                 .collect();
             let sensitivity = self.compiled.sensitivities(&run, &directions);

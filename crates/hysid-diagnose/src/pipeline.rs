@@ -11,15 +11,18 @@ use crate::error::DiagnoseError;
 use crate::evidence::correlation_time;
 use crate::experiment::{present_separation, propose};
 use crate::file::*;
+use crate::firmness::{firmness, likelihoods};
 use crate::hold::free_run;
 use crate::hypothesis::Setting;
+use crate::left::Left;
 use crate::openset::correction;
 use crate::picture::Picture;
 use crate::records::*;
 use crate::report_values::{reported, sentence};
 use crate::screen::screen;
 use crate::search::{Search, calibrate, words};
-use crate::verdict::{FIRM, Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports, verdict};
+use crate::second_look::unlikely;
+use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, verdict};
 use crate::weigh::*;
 
 /// Options of a diagnosis.
@@ -81,8 +84,6 @@ pub struct Diagnosis {
 /// Most samples that the search works on where the outputs are thinned, and where they are not; a longer recording is used in windows.
 const MOST_SAMPLES: usize = 26_000;
 const MOST_ROWS: usize = 12_000;
-/// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
-const BETTER: f64 = 0.97;
 /// Share of the time after which no further effects are looked for: what was found must still be judged.
 pub const COMPOSING: f64 = 0.6;
 
@@ -171,32 +172,39 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let tau = correlation_time(&data.layout, &none.base.fit.residual);
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(&plain, options, hooks);
-    let mut gross = if none.base.gross() || none.base.far() { plainly.start(&none) } else { None };
-    let look = match &gross {
-        Some((start, found)) => {
-            let words = ("chance", ": nearly all of it is the effect itself; blocks held out of the fit do");
-            Some((&plainly, start, found, words))
-        }
-        None if none.base.coloured() => {
-            let words = ("coloured noise", "; effects that were fitted predict blocks held out of the fit better");
-            Some((&search, &none, &candidates, words))
-        }
-        None => None,
-    };
+    let murky = none.base.gross() || none.base.far();
+    let plain_start = if murky || none.base.coloured() { plainly.start(&none) } else { None };
     let mut significant = test.p_value < options.alpha;
-    if !significant
-        && let Some((search, start, found, (from, but))) = look
-        && !(hooks.expired)(COMPOSING)
-        && let Some(p) = search.second_look(start, found)
-    {
-        let blind = test.p_value;
-        file.notes.push(format!(
-            "surrogates of the residual do not tell the mismatch from {from} (p = {blind:.3}){but} (p = {p:.1e})"
-        ));
-        file.mismatch.p_value = finite(p.min(blind));
-        significant = true;
-    }
     let mut pool = Vec::new();
+    // A coloured noise model takes part of a mismatch for noise: what plain squares would find is heard too.
+    if !murky && let Some((start, found)) = &plain_start {
+        (hooks.progress)("refitting the likeliest effects without a noise model");
+        pool = search.under_noise(&none, &plainly.glance(start, found));
+    }
+    let mut gross = plain_start.filter(|_| murky);
+    if !significant && !(hooks.expired)(COMPOSING) {
+        (hooks.progress)("taking a second look");
+        let seen = match &gross {
+            Some((start, found)) => plainly.on_blocks(start, &plainly.glance(start, found)),
+            None => {
+                search.glance(&none, &candidates).into_iter().for_each(|h| add(&mut pool, h));
+                search.by_chance(&none, &pool, candidates.len())
+            }
+        };
+        let seen =
+            seen.or_else(|| correction(&none.base, setting.noise).map(|o| unlikely(&o)).filter(|p| *p < options.alpha));
+        if let Some(p) = seen {
+            file.notes.push(format!(
+                "surrogates of the residual do not tell the mismatch from noise (p = {:.3}); effects that were fitted to it do (p = {p:.1e})",
+                test.p_value
+            ));
+            file.mismatch.p_value = finite(p.min(test.p_value));
+            significant = true;
+        }
+    }
+    if !significant {
+        pool.clear();
+    }
     if significant && let Some((start, found)) = gross.take() {
         plainly.extend(&start, &found, &mut pool);
         let sets = search.under_noise(&none, &pool);
@@ -232,32 +240,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
     let blocks = block_scores(setting, &pool, hooks.expired);
     let winner = if significant { tie_broken(&pool, &blocks) } else { 0 };
-    let remaining = (!pool[winner].effects.is_empty()).then(|| search.remains(&pool[winner]));
-    let imperfect = remaining.as_ref().is_some_and(|t| t.p_value < options.alpha);
-    let log = log_weights(&pool, &weighed, &blocks, winner, if imperfect { IMPERFECT_WEIGHT } else { EVIDENCE_WEIGHT });
-    let probability = probabilities(&log, 1.0);
-    let claims = weighed[winner].claims.clone();
-    let mut support = supports(&claims, &weighed, &probability);
-    // A set that leaves something significant is not the truth: its members may stand in for something else. Three members imitate almost
-    // anything: on development cases such sets were wrong more often than right.
-    if (imperfect && claims.len() > 1) || claims.len() > 2 {
-        support.iter_mut().for_each(Support::weaken);
-    }
-    for (e, s) in pool[winner].effects.iter().zip(&mut support) {
-        if bounded(&pool[winner].base, e) || e.mechanism.family.members_imitate() {
-            s.mechanism = s.mechanism.min(NOT_FIRM);
-        }
-    }
-    // What is still far from the recording is not understood, whatever was gained.
-    if pool[winner].base.far() {
-        support.iter_mut().for_each(Support::weaken);
-    }
-    // Two members of one family in one set: something of that kind, but neither of them as it stands.
-    for i in 0..claims.len() {
-        if claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family) {
-            support[i].weaken();
-        }
-    }
+    let left = Left::of(&search, &pool, winner, significant);
+    let probability = likelihoods(&pool, &weighed, &blocks, winner, left.imperfect);
+    let support = firmness(&pool, &weighed, &probability, winner, left.imperfect);
     file.verdict = verdict(&support);
     let best = &pool[winner];
     file.effects = best
@@ -320,33 +305,13 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             propose(setting, best, &pool[rival], present, options.seed)
         });
     }
-    if let Some(remaining) = remaining {
-        let noise = noise_floor(best);
-        let left =
-            |e: &[f64]| data.layout.rms(e).iter().zip(&noise).map(|(r, n)| (r * r - n * n).max(0.0)).sum::<f64>();
-        let share =
-            (left(&best.base.fit.residual) / left(&pool[0].base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
-        let share = if share.is_finite() { share } else { 0.0 };
-        file.remaining = Some(RemainingRecord { p_value: remaining.p_value, share });
-        if remaining.p_value < options.alpha {
-            (hooks.progress)("modelling what remains");
-            if let Some(open) = correction(&best.base)
-                && open.block_ratio < BETTER
-            {
-                // An effect that is really there is still named; what most of the mismatch is decides the verdict.
-                if share > 0.5 || (share > 0.2 && support.iter().all(|s| s.family < FIRM)) {
-                    file.verdict = VerdictKind::NotInCatalogue;
-                }
-                file.correction = Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record });
-            }
-        }
-    } else if significant
-        && let Some(open) = correction(&best.base)
-        && open.block_ratio < BETTER
-    {
-        file.verdict = VerdictKind::NotInCatalogue;
-        file.correction = Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record });
+    if winner > 0 {
+        file.remaining = Some(left.record(&pool, winner));
     }
+    if left.is_outside(&support, file.remaining.as_ref()) {
+        file.verdict = VerdictKind::NotInCatalogue;
+    }
+    file.correction = left.believed();
 
     (hooks.progress)("scoring on the hold-out");
     let augmented = (!best.effects.is_empty() && !vetoed).then(|| best.base.document());

@@ -6,16 +6,19 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::base::Base;
-use crate::compose::{SearchOptions, add, compose, short_list, superposed};
+use crate::compose::{SearchOptions, add, compose, short_list};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all};
-use crate::hypothesis::{Hypothesis, Key, Setting, block_score};
+use crate::hypothesis::{Hypothesis, Key, Setting};
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
 use crate::pipeline::{COMPOSING, Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
+
+/// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
+const WORSE: f64 = 1.05;
 
 /// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
 pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Base<'d>, DiagnoseError> {
@@ -44,10 +47,12 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
             at_s: s.start_s + sample as f64 * setting.data.period_s,
         });
     };
+    let rms = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual).sqrt();
     // Under its own noise, twice.
     let polished = setting.fit(simulation, &best.values(), Some(&best.whitener), 2, 20);
     Ok(match polished {
-        Some(p) if p.log_likelihood > best.log_likelihood => p,
+        // Noise of any colour may not explain what the simulation can.
+        Some(p) if p.log_likelihood > best.log_likelihood && rms(&p) < WORSE * rms(&best) => p,
         _ => best,
     })
 }
@@ -61,13 +66,6 @@ const MOST_CARRIED: usize = 8;
 const STOP_SCORE: f64 = 25.0;
 /// Candidates that are refitted alone.
 const SHORT_LIST: usize = 10;
-
-/// Share of the whitened residual's power that an effect must take to count without the surrogates.
-const LARGE: f64 = 0.25;
-/// Log evidence that speaks for a set without the surrogates.
-const SURE: f64 = 15.0;
-/// Share of the squared error on held-out blocks that noise never takes away.
-const HALF: f64 = 0.5;
 
 /// A search for sets of effects on one calibrated simulation.
 pub struct Search<'a, 'd> {
@@ -171,29 +169,6 @@ impl<'a, 'd> Search<'a, 'd> {
             candidates.iter().flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref())).collect();
         let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed };
         surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, options)
-    }
-
-    /// A second look where the surrogates see nothing: they are made of the residual itself, and where much of it is mismatch they carry its
-    /// shape; and two effects that cancel each other show in no single score. The likeliest effects and pairs are fitted; a set that takes
-    /// [`LARGE`] of the residual's power or brings [`SURE`] of log evidence, and predicts blocks that it was not fitted to better, is no
-    /// accident. Nor is one that leaves [`HALF`] of the squared error on such blocks, however few they are.
-    ///
-    /// Returns the p-value of the difference on the blocks, corrected for the number of sets tried, where there is a mismatch.
-    pub fn second_look(&self, none: &Hypothesis<'d>, candidates: &[Candidate]) -> Option<f64> {
-        let mut fitted = refit_all(self.setting, none, &short_list(candidates, 5));
-        fitted.extend(superposed(self.setting, none, candidates, 4));
-        let tried = fitted.len() as f64;
-        let best = fitted.into_iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-        let rows = self.setting.noise.share() * self.setting.data.rows() as f64;
-        let large = best.base.log_likelihood - none.base.log_likelihood > -0.5 * rows * (1.0 - LARGE).ln();
-        if !large && best.log_evidence - none.log_evidence < SURE {
-            return None;
-        }
-        let (_, before) = block_score(self.setting, none)?;
-        let (_, after) = block_score(self.setting, &best)?;
-        let p = (crate::weigh::better_by_chance(&before, &after)? * tried).min(1.0);
-        let halved = after.iter().sum::<f64>() < HALF * before.iter().sum::<f64>();
-        (p < self.options.alpha || halved).then_some(p)
     }
 }
 

@@ -112,4 +112,10 @@ impl Family {
     pub fn members_imitate(self) -> bool {
         self == Self::ActuatorHysteresis
     }
+
+    /// Whether laws outside the catalogue look like its members on any one recording: a fractional element and a spectrum of relaxation times
+    /// are a single relaxation within the band that was excited. Such a family is never said firmly.
+    pub fn stands_for_others(self) -> bool {
+        self == Self::LinearMemory
+    }
 }

@@ -1,0 +1,86 @@
+//! What is left of the winning set's residual: whether something significant is, whether generic terms find it, and whether the set is then only
+//! an imitation of a law that the catalogue does not have.
+
+use crate::evidence::SurrogateTest;
+use crate::file::finite;
+use crate::file::{CorrectionRecord, RemainingRecord};
+use crate::hypothesis::Hypothesis;
+use crate::openset::{OpenSet, correction};
+use crate::records::noise_floor;
+use crate::search::Search;
+use crate::second_look::unlikely;
+use crate::verdict::{FIRM, Support};
+
+/// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
+const BETTER: f64 = 0.97;
+/// Share of a set's evidence that generic terms may add to it, and log evidence by which they may beat it alone, before it is an imitation.
+/// On development cases with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
+const AS_MUCH: f64 = 0.5;
+const FAR_MORE: f64 = 5.0;
+
+/// What is left of a set's residual.
+pub struct Left {
+    /// The surrogate test of the residual; `None` where the set is empty.
+    test: Option<SurrogateTest>,
+    /// Generic terms for the residual; `None` where no mismatch is significant or no term is chosen.
+    open: Option<OpenSet>,
+    /// Whether generic terms explain so much that the set is an imitation.
+    foreign: bool,
+    /// Whether something significant is left.
+    pub imperfect: bool,
+    alpha: f64,
+}
+
+impl Left {
+    /// Of the `winner` of a pool whose first set is the simulation without effects.
+    pub fn of(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize, significant: bool) -> Self {
+        let (best, none) = (&pool[winner], &pool[0]);
+        let alpha = search.options.alpha;
+        let test = (winner > 0).then(|| search.remains(best));
+        let kind = search.setting.noise;
+        let open = if significant { correction(&best.base, kind) } else { None };
+        let seen = open.as_ref().filter(|o| unlikely(o) < alpha);
+        let explained = best.log_evidence - none.log_evidence;
+        let alone = || {
+            let open = correction(&none.base, kind).filter(|o| unlikely(o) < alpha);
+            open.is_some_and(|o| o.gain > explained + FAR_MORE)
+        };
+        let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || alone());
+        let imperfect = winner > 0 && (foreign || seen.is_some() || test.as_ref().is_some_and(|t| t.p_value < alpha));
+        Self { test, open, foreign, imperfect, alpha }
+    }
+
+    /// As it is reported.
+    pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> RemainingRecord {
+        let p = self.test.as_ref().map_or(1.0, |t| t.p_value);
+        RemainingRecord {
+            p_value: p.min(self.open.as_ref().map_or(1.0, unlikely)),
+            share: share(&pool[winner], &pool[0]),
+        }
+    }
+
+    /// Whether the mismatch is none of the catalogue: no set stands and a correction does, the set is an imitation, or most of the mismatch
+    /// is left. An effect that is really there is still named; what most of the mismatch is decides.
+    pub fn is_outside(&self, support: &[Support], remaining: Option<&RemainingRecord>) -> bool {
+        let helps = self.open.as_ref().is_some_and(|o| o.block_ratio < BETTER);
+        let Some(remaining) = remaining else { return helps };
+        let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
+        self.foreign || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
+    }
+
+    /// The correction, where it models something that is left and helps where it was not fitted.
+    pub fn believed(self) -> Option<CorrectionRecord> {
+        let wanted = self.imperfect || self.test.is_none();
+        let open = self.open.filter(|o| wanted && o.block_ratio < BETTER)?;
+        Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record })
+    }
+}
+
+/// Share of the mismatch, above the noise, that a set leaves.
+fn share(best: &Hypothesis<'_>, none: &Hypothesis<'_>) -> f64 {
+    let layout = &best.base.model.data().layout;
+    let noise = noise_floor(best);
+    let left = |e: &[f64]| layout.rms(e).iter().zip(&noise).map(|(r, n)| (r * r - n * n).max(0.0)).sum::<f64>();
+    let share = (left(&best.base.fit.residual) / left(&none.base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
+    if share.is_finite() { share } else { 0.0 }
+}

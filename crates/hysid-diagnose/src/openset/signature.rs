@@ -1,0 +1,68 @@
+//! The signature of a correction: what the families of generic signals say of memory, rate, symmetry and side.
+
+use super::terms::{Kind, Term};
+use crate::base::Base;
+use crate::evidence::{FeatureGroup, Projector, Whitener, norm2, score};
+use crate::file::SignatureRecord;
+
+/// The signature: which families of terms see the residual.
+pub fn signature(
+    base: &Base<'_>,
+    terms: &[Term],
+    noise: &Whitener,
+    chosen: &[usize],
+    coefficients: &[f64],
+) -> SignatureRecord {
+    let data = base.model.data();
+    let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(&data.layout, c)));
+    let mut r = noise.apply(&data.layout, &base.fit.residual);
+    own.remove(&mut r);
+    let total = norm2(&r);
+    let family = |wanted: &dyn Fn(&Term) -> bool| -> f64 {
+        let columns: Vec<Vec<f64>> = terms.iter().filter(|t| wanted(t)).map(|t| t.column.clone()).collect();
+        if columns.is_empty() {
+            return f64::NEG_INFINITY;
+        }
+        FeatureGroup::new(&columns, &data.layout, noise, &own)
+            .map_or(f64::NEG_INFINITY, |g| score(total, g.explained(&r), r.len(), g.columns.len()))
+    };
+    let plant = |t: &Term| t.side == "plant";
+    let fixed = family(&|t| plant(t) && matches!(t.kind, Kind::Odd | Kind::Even));
+    let play = family(&|t| t.kind == Kind::Play);
+    let lag = family(&|t| plant(t) && t.kind == Kind::Lag);
+    let memory = if play.max(lag) <= fixed + 6.0 {
+        "none"
+    } else if play >= lag {
+        "rate_independent"
+    } else {
+        "rate_dependent"
+    };
+    let side = ["plant", "input", "output"]
+        .into_iter()
+        .map(|s| (s, family(&|t| t.side == s && t.kind != Kind::Time)))
+        .chain([("time", family(&|t| t.kind == Kind::Time))])
+        .fold(("plant", f64::NEG_INFINITY), |best, x| if x.1 > best.1 { x } else { best })
+        .0;
+    let energy = |wanted: &dyn Fn(Kind) -> bool| -> f64 {
+        chosen
+            .iter()
+            .zip(coefficients)
+            .filter(|(i, _)| wanted(terms[**i].kind))
+            .map(|(i, c)| c * c * norm2(&terms[*i].column))
+            .sum()
+    };
+    let (odd, even) = (energy(&|k| k != Kind::Even), energy(&|k| k == Kind::Even));
+    let symmetry = if odd > 9.0 * even {
+        "odd"
+    } else if even > 9.0 * odd {
+        "even"
+    } else {
+        "mixed"
+    };
+    SignatureRecord {
+        memory: memory.into(),
+        rate_dependent: memory == "rate_dependent",
+        symmetry: symmetry.into(),
+        side: side.into(),
+    }
+}
