@@ -25,7 +25,7 @@ pub struct Left {
     /// Generic terms for the residual; `None` where no mismatch is significant or no term is chosen.
     open: Option<OpenSet>,
     /// Whether generic terms explain so much that the set is an imitation.
-    foreign: bool,
+    pub foreign: bool,
     /// Whether something significant is left.
     pub imperfect: bool,
     alpha: f64,

@@ -311,10 +311,14 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if left.is_outside(&support, file.remaining.as_ref()) {
         file.verdict = VerdictKind::NotInCatalogue;
     }
+    if left.foreign && !vetoed {
+        file.notes.push("the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input".into());
+    }
+    let written = winner > 0 && !vetoed && !left.foreign;
     file.correction = left.believed();
 
     (hooks.progress)("scoring on the hold-out");
-    let augmented = (!best.effects.is_empty() && !vetoed).then(|| best.base.document());
+    let augmented = written.then(|| best.base.document());
     let before = free_run(&baseline, &held, &setting.own_states, setting.substeps);
     let after = augmented.as_ref().and_then(|a| free_run(a, &held, &setting.own_states, setting.substeps));
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());

@@ -101,6 +101,30 @@ fn dry_friction_is_named_with_its_size_and_the_hold_out_improves() {
 }
 
 #[test]
+fn a_hum_is_found_although_a_noise_model_would_swallow_it() {
+    let with_hum = |name: &str, seed: u64| {
+        let quiet = recording(name, seed, 900, |_, _| 0.0);
+        let mut channels = quiet.channels().to_vec();
+        let size = 0.08 * rms(&channels[1].samples);
+        channels[1].samples.iter_mut().enumerate().for_each(|(i, y)| *y += size * (3.1 * i as f64 * PERIOD).sin());
+        Recording::new(name, quiet.clock(), channels).unwrap()
+    };
+    let d = run(BASELINE, &[with_hum("est.csv", 1)], &[with_hum("val.csv", 2)]).unwrap();
+    assert!(d.file.mismatch.p_value.unwrap() < 0.01, "{}", d.file.summary);
+    assert_eq!(d.file.effects[0].family, "external_disturbance", "{}", d.file.summary);
+    assert!(d.file.fit[0].ratio.unwrap() < 0.5, "{:?}", d.file.fit);
+}
+
+#[test]
+fn a_law_that_the_catalogue_does_not_have_is_not_given_a_firm_name() {
+    let d = diagnosed(900, |x, v| 1.2 * v * (40.0 * x).sin());
+    assert_eq!(d.file.verdict, VerdictKind::NotInCatalogue, "{} {:?}", d.file.summary, d.file.remaining);
+    assert!(d.file.effects.iter().all(|e| e.family_probability < 0.9), "{:?}", d.file.effects);
+    let correction = d.file.correction.expect("generic terms model it");
+    assert!(correction.ratio.unwrap() < 0.97 && correction.slot == "state:v", "{correction:?}");
+}
+
+#[test]
 fn the_same_bytes_for_any_number_of_threads() {
     let bytes = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
