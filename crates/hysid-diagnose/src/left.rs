@@ -14,7 +14,7 @@ use crate::verdict::{FIRM, Support};
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
 /// Share of a set's evidence that generic terms may add to it, and log evidence by which they may beat it alone, before it is an imitation.
-/// On development cases with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
+/// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
 const AS_MUCH: f64 = 0.5;
 const FAR_MORE: f64 = 5.0;
 
