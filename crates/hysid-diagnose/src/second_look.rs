@@ -40,7 +40,7 @@ impl<'d> Search<'_, 'd> {
     /// A bound for the probability that a set gains so much evidence where nothing is missing, if the set predicts blocks that it was not
     /// fitted to no worse than the simulation as it is.
     ///
-    /// A ratio of evidences exceeds `x` by chance with a probability of at most `1/x` (Markov); there are as many sets as can be made of the
+    /// A set of nothing but drifts does not count. A ratio of evidences exceeds `x` by chance with a probability of at most `1/x` (Markov); there are as many sets as can be made of the
     /// candidates.
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
         let sets = |h: &Hypothesis<'_>| {
@@ -49,7 +49,8 @@ impl<'d> Search<'_, 'd> {
                 .product::<f64>()
         };
         let bound = |h: &Hypothesis<'_>| ODDS_AGAINST * sets(h) * (start.log_evidence - h.log_evidence).exp();
-        let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
+        let telling = |h: &&Hypothesis<'_>| h.effects.iter().any(|e| !e.mechanism.family.is_slow_noise());
+        let best = fitted.iter().filter(telling).min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
         let p = bound(best).min(1.0);
         if p >= self.options.alpha {
             return None;

@@ -113,9 +113,15 @@ impl Family {
         self == Self::ActuatorHysteresis
     }
 
-    /// Whether laws outside the catalogue look like its members on any one recording: a fractional element and a spectrum of relaxation times
-    /// are a single relaxation within the band that was excited. Such a family is never said firmly.
+    /// Whether something outside the catalogue looks like its members on any one recording, so that it is never said firmly: a fractional
+    /// element and a spectrum of relaxation times are a single relaxation within the band that was excited, and a zero that moves is what
+    /// noise does that rises towards low frequencies.
     pub fn stands_for_others(self) -> bool {
-        self == Self::LinearMemory
+        self == Self::LinearMemory || self.is_slow_noise()
+    }
+
+    /// Whether its members are what noise of low frequency does: no noise model of a recording's own length can tell.
+    pub fn is_slow_noise(self) -> bool {
+        self == Self::SensorDrift
     }
 }
