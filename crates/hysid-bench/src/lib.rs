@@ -22,11 +22,12 @@ pub const TRUTH: [(f64, &str); 11] = [
 ];
 
 /// A portable stream of uniform numbers (Knuth's multiplicative congruence, high bits).
-struct Uniform(u64);
+pub struct Uniform(pub u64);
 
 impl Uniform {
     /// In -1 to 1.
-    fn next(&mut self) -> f64 {
+    #[allow(clippy::should_implement_trait)] // a stream without an end
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }

@@ -5,7 +5,7 @@ use crate::evidence::SurrogateTest;
 use crate::file::finite;
 use crate::file::{CorrectionRecord, RemainingRecord};
 use crate::hypothesis::Hypothesis;
-use crate::openset::{OpenSet, correction};
+use crate::openset::OpenSet;
 use crate::records::noise_floor;
 use crate::search::Search;
 use crate::second_look::unlikely;
@@ -37,12 +37,11 @@ impl Left {
         let (best, none) = (&pool[winner], &pool[0]);
         let alpha = search.options.alpha;
         let test = (winner > 0).then(|| search.remains(best));
-        let kind = search.setting.noise;
-        let open = if significant { correction(&best.base, kind) } else { None };
+        let open = if significant { search.open(best) } else { None };
         let seen = open.as_ref().filter(|o| unlikely(o) < alpha);
         let explained = best.log_evidence - none.log_evidence;
         let alone = || {
-            let open = correction(&none.base, kind).filter(|o| unlikely(o) < alpha);
+            let open = search.open(none).filter(|o| unlikely(o) < alpha);
             open.is_some_and(|o| o.gain > explained + FAR_MORE)
         };
         let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || alone());

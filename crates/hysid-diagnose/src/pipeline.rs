@@ -15,7 +15,6 @@ use crate::firmness::{firmness, likelihoods};
 use crate::hold::free_run;
 use crate::hypothesis::Setting;
 use crate::left::Left;
-use crate::openset::correction;
 use crate::picture::Picture;
 use crate::records::*;
 use crate::report_values::{reported, sentence};
@@ -191,8 +190,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
                 search.by_chance(&none, &pool, candidates.len())
             }
         };
-        let seen =
-            seen.or_else(|| correction(&none.base, setting.noise).map(|o| unlikely(&o)).filter(|p| *p < options.alpha));
+        let seen = seen.or_else(|| search.open(&none).map(|o| unlikely(&o)).filter(|p| *p < options.alpha));
         if let Some(p) = seen {
             file.notes.push(format!(
                 "surrogates of the residual do not tell the mismatch from noise (p = {:.3}); effects that were fitted to it do (p = {p:.1e})",

@@ -1,6 +1,6 @@
 //! The search for a set of effects: calibration of what there is, test, refit of the likeliest, composition.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
@@ -13,6 +13,7 @@ use crate::fitting::{refit, refit_all};
 use crate::hypothesis::{Hypothesis, Key, Setting};
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
+use crate::openset::{OpenSet, correction};
 use crate::pipeline::{COMPOSING, Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
 use crate::slot::Slot;
@@ -77,12 +78,14 @@ pub struct Search<'a, 'd> {
     pub hooks: &'a Hooks<'a>,
     /// Tests of what remains, by statement: composition and the verdict ask for the same ones.
     tests: RefCell<BTreeMap<Key, SurrogateTest>>,
+    /// Generic terms for the simulation without effects: the second look, the verdict and the correction ask for the same ones.
+    open: OnceCell<Option<OpenSet>>,
 }
 
 impl<'a, 'd> Search<'a, 'd> {
     /// A search that has found nothing yet.
     pub fn new(setting: &'a Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
-        Self { setting, options, hooks, tests: RefCell::default() }
+        Self { setting, options, hooks, tests: RefCell::default(), open: OnceCell::new() }
     }
 
     /// The simulation without effects under this search's noise model, and what could be missing in it.
@@ -146,6 +149,12 @@ impl<'a, 'd> Search<'a, 'd> {
             set = Some(h);
         }
         Ok(set)
+    }
+
+    /// Generic terms for what is left of a hypothesis' residual.
+    pub fn open(&self, h: &Hypothesis<'_>) -> Option<OpenSet> {
+        let found = || correction(&h.base, self.setting.noise);
+        if h.effects.is_empty() { self.open.get_or_init(found).clone() } else { found() }
     }
 
     /// The test of what remains of a hypothesis' residual.

@@ -20,8 +20,8 @@ const LARGE: f64 = 0.25;
 const SURE: f64 = 15.0;
 /// Share of the squared error on held-out blocks that noise never takes away.
 const HALF: f64 = 0.5;
-/// Odds against a mismatch before the recording is looked at. The noise model is an estimate: on 43 development controls (seeds 3 and 5) under six kinds of
-/// noise the best of the sets gained at most 7.2 nats, four times more than 4.
+/// Odds against a mismatch before the recording is looked at. The noise model is an estimate: on 43 development controls (seeds 3 and 5)
+/// under six kinds of noise the best of the sets gained at most 7.2 nats, four times more than 4.
 const ODDS_AGAINST: f64 = 10.0;
 
 /// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
@@ -40,8 +40,8 @@ impl<'d> Search<'_, 'd> {
     /// A bound for the probability that a set gains so much evidence where nothing is missing, if the set predicts blocks that it was not
     /// fitted to no worse than the simulation as it is.
     ///
-    /// A set of nothing but drifts does not count. A ratio of evidences exceeds `x` by chance with a probability of at most `1/x` (Markov); there are as many sets as can be made of the
-    /// candidates.
+    /// A set of nothing but drifts does not count. A ratio of evidences exceeds `x` by chance with a probability of at most `1/x` (Markov);
+    /// there are as many sets as can be made of the candidates.
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
         let sets = |h: &Hypothesis<'_>| {
             (0..h.effects.len())

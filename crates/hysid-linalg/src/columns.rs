@@ -82,12 +82,6 @@ pub trait Columns: Sync {
         });
         Matrix::from_column_major(m, k, sums).unwrap_or_else(|| Matrix::zeros(m, k))
     }
-
-    /// The whole Gram matrix Phi'Phi, when it is cheaper than `columns` of its columns one by one; `None` otherwise.
-    fn whole_gram(&self, columns: usize) -> Option<Matrix> {
-        let _ = columns;
-        None
-    }
 }
 
 /// Rows in a tile: two tiles of doubles fit a first-level cache with room to spare.

@@ -8,46 +8,28 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Context;
-use hysid_dictionary::{Factor, Quantity, Signals, Term};
+use hysid_bench::{Uniform, known_model};
+use hysid_dictionary::{Factor, Model, Quantity, Term};
 use serde_json::Value;
 use xshell::{Shell, cmd};
 
-const BEGIN: &str = "<!-- streaming: written by `cargo xtask bench --cases stream` -->";
-const END: &str = "<!-- end of streaming -->";
+use super::page::renew;
 
 /// Size of the file.
 const BYTES: u64 = 2_000_000_000;
 /// Standard deviation of the equation noise.
 const NOISE: f64 = 0.01;
 
-/// The system that made the data: coefficients and terms.
-const SYSTEM: [(f64, &str); 11] = [
-    (0.05, "1"),
-    (0.55, "y[n-1]"),
-    (-0.20, "y[n-2]"),
-    (0.60, "u[n-1]"),
-    (0.25, "u[n-2]"),
-    (0.15, "u[n-1]^2"),
-    (-0.20, "y[n-1]*u[n-2]"),
-    (0.12, "u[n-1]*u[n-3]"),
-    (-0.10, "y[n-1]^3"),
-    (0.18, "y[n-2]*u[n-1]*u[n-2]"),
-    (-0.15, "u[n-2]^2*u[n-3]"),
-];
-
 /// Runs the case and renews its part of `docs/performance.md`.
 pub fn run(shell: &Shell, root: &Path) -> anyhow::Result<()> {
     let file = File(std::env::temp_dir().join("hysid_stream.csv"));
     eprintln!("writing {} ({:.1} GB)", file.0.display(), BYTES as f64 / 1e9);
-    let terms = system()?;
-    write(&file.0, &terms)?;
-    let text = measure(shell, root, &file.0, &terms)?;
+    let model = known_model();
+    write(&file.0, &model)?;
+    let text = measure(shell, root, &file.0, &model)?;
     let page = root.join("docs/performance.md");
     let old = std::fs::read_to_string(&page)?;
-    let (before, rest) = old.split_once(BEGIN).context("the page has no part on streaming")?;
-    let (_, after) = rest.split_once(END).context("the part on streaming has no end")?;
-    std::fs::write(&page, format!("{before}{BEGIN}\n\n{text}\n{END}{after}"))?;
+    std::fs::write(&page, renew(&old, "stream", &format!("\n{text}\n")))?;
     eprintln!("wrote {}", page.display());
     Ok(())
 }
@@ -61,18 +43,10 @@ impl Drop for File {
     }
 }
 
-fn system() -> anyhow::Result<Vec<(f64, Term)>> {
-    SYSTEM.iter().map(|(theta, text)| Ok((*theta, Signals::siso().parse(text)?))).collect()
-}
-
 /// A run of the system with a white uniform input and equation noise, written until the file is full.
-fn write(file: &Path, terms: &[(f64, Term)]) -> anyhow::Result<()> {
+fn write(file: &Path, model: &Model) -> anyhow::Result<()> {
     let mut out = std::io::BufWriter::with_capacity(1 << 20, std::fs::File::create(file)?);
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    };
+    let mut uniform = Uniform(0x9e37_79b9_7f4a_7c15);
     // The last samples, newest first; place 0 is the present.
     let (mut u, mut y) = ([0.0; 4], [0.0; 4]);
     let mut line = String::new();
@@ -80,13 +54,13 @@ fn write(file: &Path, terms: &[(f64, Term)]) -> anyhow::Result<()> {
     while bytes < BYTES {
         u.rotate_right(1);
         y.rotate_right(1);
-        u[0] = uniform();
+        u[0] = uniform.next();
         let past = |f: Factor| {
             if f.quantity == Quantity::Value(hysid_dictionary::Signal::Output) { y[f.lag] } else { u[f.lag] }
         };
-        let next: f64 = terms.iter().map(|(theta, term)| theta * term.evaluate(past)).sum();
+        let next: f64 = model.theta().iter().zip(model.terms()).map(|(theta, term)| theta * term.evaluate(past)).sum();
         // Four uniforms of variance 1/3 each.
-        y[0] = next + NOISE * (0.75_f64).sqrt() * (0..4).map(|_| uniform()).sum::<f64>();
+        y[0] = next + NOISE * (0.75_f64).sqrt() * (0..4).map(|_| uniform.next()).sum::<f64>();
         line.clear();
         writeln!(line, "{},{}", u[0], y[0])?;
         out.write_all(line.as_bytes())?;
@@ -96,7 +70,7 @@ fn write(file: &Path, terms: &[(f64, Term)]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn measure(shell: &Shell, root: &Path, file: &Path, terms: &[(f64, Term)]) -> anyhow::Result<String> {
+fn measure(shell: &Shell, root: &Path, file: &Path, model: &Model) -> anyhow::Result<String> {
     let program = root.join("target/release/hysid");
     let mut text = String::from(
         "| work | threads | wall s | MB/s | CPU s | peak MiB | true terms | load |\n|---|---|---|---|---|---|---|---|\n",
@@ -123,8 +97,8 @@ fn measure(shell: &Shell, root: &Path, file: &Path, terms: &[(f64, Term)]) -> an
             let value: Value = serde_json::from_str(&output)?;
             let number = |key: &str| value[key].as_f64().or_else(|| value[key][0].as_f64()).unwrap_or(f64::NAN);
             let found = value["terms"].as_array().map_or("-".to_string(), |found| {
-                let is = |text: &str| found.iter().any(|f| f["term"] == text);
-                format!("{} of {}", SYSTEM.iter().filter(|(_, t)| is(t)).count(), terms.len())
+                let is = |t: &&Term| found.iter().any(|f| f["term"] == model.signals().format(t));
+                format!("{} of {}", model.terms().iter().filter(is).count(), model.terms().len())
             });
             writeln!(
                 text,
