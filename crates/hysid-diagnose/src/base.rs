@@ -76,8 +76,19 @@ pub fn fit_simulation<'d>(
 /// Log likelihood of a residual under a noise model, up to a constant of the data set.
 pub fn log_likelihood(data: &DataSet, noise: &Whitener, residual: &[f64]) -> f64 {
     let white = noise.apply(&data.layout, residual);
-    let coefficients: usize = noise.models.iter().map(|m| m.coefficients()).sum();
-    -0.5 * norm2(&white) - noise.log_scale(&data.layout) - 0.5 * coefficients as f64 * (data.rows().max(2) as f64).ln()
+    -0.5 * norm2(&white) - noise.log_scale(&data.layout) - 0.5 * noise.coefficients() as f64 * rows(data).ln()
+}
+
+fn rows(data: &DataSet) -> f64 {
+    data.rows().max(2) as f64
+}
+
+/// What [`log_likelihood`] would be more with a price of one for each coefficient of the noise model.
+///
+/// Half of `ln n` is what a coefficient must gain before it is believed. Whoever asks whether something besides noise is there must not
+/// have an effect win by the coefficients that it spares: noise of any colour is likely beforehand.
+pub fn spared(data: &DataSet, noise: &Whitener) -> f64 {
+    noise.coefficients() as f64 * (0.5 * rows(data).ln() - 1.0).max(0.0)
 }
 
 /// A noise whose innovations are a smaller share of it than this is no noise: something moves the output slowly and smoothly.

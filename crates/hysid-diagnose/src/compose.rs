@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::fitting::{Part, assemble, complete, refit_all, without};
+use crate::fitting::{HOPELESS, Part, assemble, complete, refit_all, without};
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::joint::pairs;
 use crate::mechanism::Mechanism;
@@ -31,9 +31,37 @@ pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
     list
 }
 
-/// Whether two mechanisms at one slot are easily taken for each other.
+/// Whether two mechanisms are easily taken for each other.
 fn rivals(a: &Mechanism, b: &Mechanism) -> bool {
-    a.family == b.family || a.contains.contains(&b.id) || a.confusable.contains(&b.id) || b.contains.contains(&a.id)
+    let names = |a: &Mechanism, b: &Mechanism| a.contains.contains(&b.id) || a.confusable.contains(&b.id);
+    a.family == b.family || names(a, b) || names(b, a)
+}
+
+/// Rivals that are heard at other slots than that of the effect whose rivals they are.
+const ELSEWHERE: usize = 3;
+/// Rivals that are fitted to the end after the best single effect is known.
+const SECOND_HEARING: usize = 4;
+
+/// The candidates that are easily taken for an effect: all at its slot, the best few at others.
+fn rivals_of<'c>(effect: &Effect, candidates: &'c [Candidate]) -> Vec<&'c Candidate> {
+    let (here, elsewhere): (Vec<&Candidate>, Vec<&Candidate>) = candidates
+        .iter()
+        .filter(|c| rivals(effect.mechanism, c.mechanism))
+        .partition(|c| c.slot.label == effect.slot.label);
+    here.into_iter().chain(elsewhere.into_iter().take(ELSEWHERE)).collect()
+}
+
+/// What is easily taken for the best single effect of a pool and was not fitted yet, or given up after a few iterations.
+pub fn unheard<'c>(pool: &[Hypothesis<'_>], candidates: &'c [Candidate]) -> Vec<&'c Candidate> {
+    let alone = |h: &&Hypothesis<'_>| h.effects.len() == 1;
+    let Some(best) = pool.iter().filter(alone).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
+        return Vec::new();
+    };
+    let heard = |c: &&Candidate| {
+        let key = [(c.mechanism.id, c.slot.label.clone())];
+        pool.iter().any(|h| h.key() == key && h.log_evidence > best.log_evidence - HOPELESS)
+    };
+    rivals_of(&best.effects[0], candidates).into_iter().filter(|c| !heard(c)).take(SECOND_HEARING).collect()
 }
 
 /// How a search is bounded.
@@ -158,12 +186,11 @@ fn extended<'d>(
         return Vec::new();
     }
     let mut list = short_list(&candidates, options.most);
-    let sibling = |c: &&Candidate| {
-        dropped.is_some_and(|d| rivals(d.mechanism, c.mechanism) && d.slot.label == c.slot.label)
-            && !list.iter().any(|l| std::ptr::eq(*l, *c))
-    };
-    let more: Vec<&Candidate> = candidates.iter().filter(sibling).collect();
-    list.extend(more);
+    for rival in dropped.map_or_else(Vec::new, |d| rivals_of(d, &candidates)) {
+        if !list.iter().any(|l| std::ptr::eq(*l, rival)) {
+            list.push(rival);
+        }
+    }
     refit_all(setting, parent, &list)
 }
 

@@ -235,7 +235,7 @@ fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usiz
 /// Candidates of a list that are fitted to the end.
 const MOST_COMPLETE: usize = 8;
 /// Log evidence by which a candidate may trail after a few iterations and still be refitted to the end.
-const HOPELESS: f64 = 40.0;
+pub const HOPELESS: f64 = 40.0;
 
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
 ///

@@ -302,6 +302,7 @@ pub fn needs_profile(mechanism: &str, shape: &str) -> bool {
             | ("gap_stop", _)
             | ("bilinear_stiffness", _)
             | ("overflow", _)
+            | ("input_saturation" | "output_saturation", _)
     )
 }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::base::Base;
-use crate::compose::{SearchOptions, add, compose, short_list};
+use crate::compose::{SearchOptions, add, compose, short_list, unheard};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all};
@@ -100,6 +100,9 @@ impl<'a, 'd> Search<'a, 'd> {
     pub fn extend(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
         (self.hooks.progress)("refitting the likeliest effects");
         for h in refit_all(self.setting, none, &short_list(candidates, SHORT_LIST)) {
+            add(pool, h);
+        }
+        for h in refit_all(self.setting, none, &unheard(pool, candidates)) {
             add(pool, h);
         }
         if let Some(h) = crate::numerics_check::artefact(self.setting, none) {

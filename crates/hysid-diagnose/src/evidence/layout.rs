@@ -91,6 +91,11 @@ impl Whitener {
         layout.series.iter().map(|s| self.models[s.output].log_scale(s.rows.len())).sum()
     }
 
+    /// Number of coefficients beyond the scales.
+    pub fn coefficients(&self) -> usize {
+        self.models.iter().map(NoiseModel::coefficients).sum()
+    }
+
     /// The largest order.
     pub fn order(&self) -> usize {
         self.models.iter().map(NoiseModel::order).max().unwrap_or(0)

@@ -11,14 +11,22 @@
 //!
 //! Reference: P. Whittle (1953); P. J. Brockwell and R. A. Davis, Time Series, section 10.8.
 
+use std::collections::BTreeMap;
+use std::f64::consts::LN_2;
+
 use hysid_signal::{fourier, inverse_fourier};
 use nalgebra::{DMatrix, DVector};
 
 use super::ar::{ArModel, fit_ar};
+use super::projector::norm2;
 
 /// Standard deviation of the prior of a knot's log power about 0: what the simulation's own parameters have taken out of the residual
 /// must not look like a noise of power zero.
 const PRIOR_SD: f64 = 3.0;
+/// Orders up to which a short autoregression is tried with a corner, beside the one that BIC chooses without a shape.
+const SHORT_ORDERS: [usize; 2] = [0, 2];
+/// Bins of an octave that lines are gathered in.
+const BINS: f64 = 24.0;
 /// Fewest samples for a shape.
 const SHORTEST: usize = 128;
 
@@ -39,6 +47,26 @@ fn log_frequency(k: usize, n: usize) -> f64 {
 /// How many real numbers line `k` of `n` samples stands for.
 fn multiplicity(k: usize, n: usize) -> f64 {
     if k == 0 || 2 * k == n { 1.0 } else { 2.0 }
+}
+
+/// Knots everywhere between the lowest frequency of `n` samples and the highest, one or two octaves apart.
+fn even_knots(n: usize) -> Vec<Vec<f64>> {
+    let (low, high) = ((1.0 / n as f64).ln(), 0.5f64.ln());
+    let even = |octaves: f64| {
+        let count = ((high - low) / (octaves * LN_2)).round().max(1.0) as usize;
+        (0..=count).map(|i| low + (high - low) * i as f64 / count as f64).collect()
+    };
+    vec![even(1.0), even(2.0)]
+}
+
+/// A single knot between the lowest frequency of `n` samples and the highest, at each octave.
+///
+/// Noise that rises below a corner (1/f, a random walk beside white noise) is so told in a few coefficients: were only the many on offer,
+/// an effect with two would be a cheap way to say the same.
+fn corners(n: usize) -> Vec<Vec<f64>> {
+    let (low, high) = ((1.0 / n as f64).ln(), 0.5f64.ln());
+    let last = ((high - low) / LN_2).floor() as usize;
+    (2..last).map(|octave| vec![low, low + octave as f64 * LN_2, high]).collect()
 }
 
 /// The two knots around `x` and the weight of the upper one.
@@ -72,6 +100,11 @@ impl SpectralShape {
             line.1 *= factor;
         }
         x.copy_from_slice(&inverse_fourier(&lines, n));
+    }
+
+    /// Number of coefficients: heights, and the place of a single corner.
+    fn coefficients(&self) -> f64 {
+        self.heights.len() as f64 + if self.heights.len() == 3 { 1.0 } else { 0.0 }
     }
 
     /// Half the logarithm of the determinant of `n` samples' covariance.
@@ -139,6 +172,41 @@ impl SpectralShape {
     }
 }
 
+impl ArModel {
+    /// With the shape that the spectrum of its innovations has, where BIC asks for one.
+    fn shaped(self, stretches: &[&[f64]], shapes: &[Vec<f64>]) -> NoiseModel {
+        let total: usize = stretches.iter().map(|s| s.len()).sum();
+        let mut bins: BTreeMap<i64, (f64, f64, f64)> = BTreeMap::new();
+        for s in stretches.iter().filter(|s| s.len() >= SHORTEST / 2) {
+            let n = s.len();
+            let mut w = vec![0.0; n];
+            self.whiten(s, &mut w);
+            // The mean is left out: a single line of any height is nothing that a spectrum's shape may follow, and an offset is an effect.
+            for (k, (re, im)) in fourier(&w).iter().enumerate().skip(1) {
+                let power = (re * re + im * im) / n as f64;
+                if !power.is_finite() {
+                    return NoiseModel { ar: self, shape: None };
+                }
+                // Neighbours between which no shape bends are one line of higher multiplicity.
+                let (x, m) = (log_frequency(k, n), multiplicity(k, n));
+                let bin = bins.entry((x * BINS / LN_2).floor() as i64).or_default();
+                *bin = (bin.0 + m * x, bin.1 + m * power, bin.2 + m);
+            }
+        }
+        let lines: Vec<(f64, f64, f64)> = bins.into_values().map(|(x, p, m)| (x / m, p / m, m)).collect();
+        let price = 0.5 * (total as f64).ln();
+        let mut best: (Option<SpectralShape>, f64) = (None, 0.0);
+        for knots in shapes {
+            if let Some((shape, gain)) = SpectralShape::fit(knots.clone(), &lines)
+                && gain - price * shape.coefficients() > best.1
+            {
+                best = (Some(shape.clone()), gain - price * shape.coefficients());
+            }
+        }
+        NoiseModel { ar: self, shape: best.0 }
+    }
+}
+
 /// The noise of one output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
@@ -152,46 +220,48 @@ impl NoiseModel {
         Self { ar: ArModel::white(sigma), shape: None }
     }
 
-    /// The noise of these stretches of one residual: an autoregression up to `max_order` (0: white), then the shape where BIC asks for it.
+    /// The noise of these stretches of one residual: an autoregression up to `max_order` (0: white) and the shape where BIC asks for it.
+    ///
+    /// A short autoregression with a corner may say in few coefficients what a long one says in many, so both are tried.
     pub fn fit(stretches: &[&[f64]], max_order: usize) -> Self {
-        let ar = fit_ar(stretches, max_order);
-        let total: usize = stretches.iter().map(|s| s.len()).sum();
         let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
+        let whole = Self { ar: fit_ar(stretches, max_order), shape: None };
         if max_order == 0 || longest < SHORTEST {
-            return Self { ar, shape: None };
+            return whole;
         }
-        let mut lines = Vec::new();
-        for s in stretches.iter().filter(|s| s.len() >= SHORTEST / 2) {
-            let n = s.len();
-            let mut w = vec![0.0; n];
-            ar.whiten(s, &mut w);
-            for (k, (re, im)) in fourier(&w).iter().enumerate() {
-                let power = (re * re + im * im) / n as f64;
-                if !power.is_finite() {
-                    return Self { ar, shape: None };
+        let bent = corners(longest);
+        let mut best = whole.ar.shaped(stretches, &[even_knots(longest), bent.clone()].concat());
+        let mut seen = vec![best.order()];
+        for order in SHORT_ORDERS {
+            let short = fit_ar(stretches, order);
+            if !seen.contains(&short.order()) {
+                seen.push(short.order());
+                let shaped = short.shaped(stretches, &bent);
+                if shaped.score(stretches) > best.score(stretches) {
+                    best = shaped;
                 }
-                lines.push((log_frequency(k, n), power, multiplicity(k, n)));
             }
         }
-        let price = 0.5 * (total as f64).ln();
-        let mut best: (Option<SpectralShape>, f64) = (None, 0.0);
-        for octaves in [1.0, 2.0] {
-            let (low, high) = ((1.0 / longest as f64).ln(), 0.5f64.ln());
-            let count = ((high - low) / (octaves * std::f64::consts::LN_2)).round().max(1.0) as usize;
-            let knots = (0..=count).map(|i| low + (high - low) * i as f64 / count as f64).collect::<Vec<f64>>();
-            let coefficients = knots.len() as f64;
-            if let Some((shape, gain)) = SpectralShape::fit(knots, &lines)
-                && gain - price * coefficients > best.1
-            {
-                best = (Some(shape), gain - price * coefficients);
-            }
-        }
-        Self { ar, shape: best.0 }
+        best
+    }
+
+    /// Log likelihood of these stretches less half of `ln n` for each coefficient.
+    fn score(&self, stretches: &[&[f64]]) -> f64 {
+        let total: usize = stretches.iter().map(|s| s.len()).sum();
+        let likelihood: f64 = stretches
+            .iter()
+            .map(|s| {
+                let mut w = vec![0.0; s.len()];
+                self.whiten(s, &mut w);
+                -0.5 * norm2(&w) - self.log_scale(s.len())
+            })
+            .sum();
+        likelihood - 0.5 * self.coefficients() as f64 * (total.max(2) as f64).ln()
     }
 
     /// Number of coefficients beyond the scale.
     pub fn coefficients(&self) -> usize {
-        self.ar.order() + self.shape.as_ref().map_or(0, |s| s.heights.len())
+        self.ar.order() + self.shape.as_ref().map_or(0, |s| s.coefficients() as usize)
     }
 
     /// Order of the autoregression.

@@ -15,7 +15,7 @@ mod terms;
 use hysid_linalg::Matrix;
 use hysid_select::{Criterion, Options as Selecting, select};
 
-use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood};
+use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use crate::data::held_out_blocks;
 use crate::evidence::{Projector, Whitener, dot, norm2};
 use crate::file::{CorrectionRecord, TermRecord};
@@ -118,7 +118,9 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
         left = layout.fit_noise(&after, order);
         (coefficients, after) = regress(base, &picked, &left, None);
     }
-    let likelihood = kind.share() * log_likelihood(base.model.data(), &left, &after);
+    let data = base.model.data();
+    let likelihood =
+        kind.share() * (log_likelihood(data, &left, &after) + spared(data, &left) - spared(data, &base.whitener));
     let price: f64 = (0..chosen.len())
         .map(|k| {
             0.5 * (kind.share() * after.len() as f64).max(2.0).ln() + ((usable.len() - k) as f64 / (k + 1) as f64).ln()

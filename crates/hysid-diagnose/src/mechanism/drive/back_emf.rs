@@ -14,11 +14,11 @@ pub static BACK_EMF: Mechanism = Mechanism {
     law: |_, purpose| match purpose {
         Purpose::Screening => Law::replace("u + w*(lag(u, tau_e) - u) - k_e*lag(v, tau_e)")
             .weight()
-            .amplitude("k_e", "u/v", -0.5, 5.0)
+            .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
             .within(0.02, 2000.0),
         Purpose::Refit => Law::replace("lag(u - k_e*v, tau_e)")
-            .amplitude("k_e", "u/v", -0.5, 5.0)
+            .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
             .within(0.02, 2000.0)
             .never_baseline(),

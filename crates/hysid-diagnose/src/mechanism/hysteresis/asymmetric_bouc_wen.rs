@@ -14,7 +14,7 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
     law: |_, _| {
         // The share a makes z tend to 1/(1 + a)^(1/n) upwards and to 1/(1 - a)^(1/n) downwards.
         Law::force("F_h*z")
-            .amplitude("F_h", "F", -1.0, 2.0)
+            .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 3.0, 4))
             .within(0.02, 20.0)
             .at_least(0.8, "v*h")

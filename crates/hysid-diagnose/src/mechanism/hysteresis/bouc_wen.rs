@@ -14,7 +14,7 @@ pub static BOUC_WEN: Mechanism = Mechanism {
     law: |_, _| {
         // Wen's law in its normalised form: |z| tends to 1, beta/(beta + gamma) = b.
         Law::force("F_h*z")
-            .amplitude("F_h", "F", -1.0, 2.0)
+            .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 3.0, 5))
             .within(0.02, 20.0)
             .at_least(0.8, "v*h")

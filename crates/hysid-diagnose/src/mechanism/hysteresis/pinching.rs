@@ -13,7 +13,7 @@ pub static PINCHING: Mechanism = Mechanism {
     already: &[],
     law: |_, _| {
         Law::force("F_h*z")
-            .amplitude("F_h", "F", -1.0, 2.0)
+            .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
             .within(0.02, 20.0)
             .at_least(0.8, "v*h")

@@ -15,7 +15,7 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
         if slot.place == Place::Force {
             // A mass on a spring that hangs on the moving part: the force that accelerates it is missing there.
             return Law::force("m_a*((2*pi*f_a)^2*(x - x_a) + 4*pi*f_a*zeta_a*(v - v_a))")
-                .amplitude("m_a", slot.mass_measure(), -0.05, 5.0)
+                .amplitude("m_a", slot.mass_measure(), 0.0, 5.0)
                 .shape("f_a", "1/t", Grid::Band(17))
                 .shape("zeta_a", "1", Grid::Values(vec![0.02]))
                 .within(0.001, 0.7)

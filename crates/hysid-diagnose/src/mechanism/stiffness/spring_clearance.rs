@@ -19,7 +19,7 @@ pub static SPRING_CLEARANCE: Mechanism = Mechanism {
         }
     },
     contains: &[],
-    confusable: &["backlash", "cubic_stiffness"],
+    confusable: &["backlash", "cubic_stiffness", "gap_stop"],
     needs: &[Need::Levels("x", 1.5)],
     sentence: "The spring {place} has free play: within {g} of the middle it gives no force.",
     signature: "Hardly any stiffness near zero: small oscillations are sloppy, large ones are not.",

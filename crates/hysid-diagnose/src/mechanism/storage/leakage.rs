@@ -15,13 +15,13 @@ pub static LEAKAGE: Mechanism = Mechanism {
         // A loss in proportion would be a change of a parameter where the baseline has one.
         if slot.has("k") {
             // Torricelli's law; the reference level keeps the unit of q_l that of a flow.
-            Law::outflow("q_l*sqrt(max(s, 0)/s_r)").amplitude("q_l", "F", -0.2, 2.0).constant(
+            Law::outflow("q_l*sqrt(max(s, 0)/s_r)").amplitude("q_l", "F", 0.0, 2.0).constant(
                 "s_r",
                 "s",
                 Grid::Reach("s", vec![1.0]),
             )
         } else {
-            Law::outflow("q_l*s/s_r").amplitude("q_l", "F", -0.2, 2.0).constant("s_r", "s", Grid::Reach("s", vec![1.0]))
+            Law::outflow("q_l*s/s_r").amplitude("q_l", "F", 0.0, 2.0).constant("s_r", "s", Grid::Reach("s", vec![1.0]))
         }
     },
     contains: &[],

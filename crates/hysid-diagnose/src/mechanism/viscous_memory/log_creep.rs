@@ -15,7 +15,7 @@ pub static LOG_CREEP: Mechanism = Mechanism {
         // The logarithm of time as three relaxations, a decade apart.
         let s = if slot.place == Place::Sensor { "y" } else { "u" };
         Law::replace(format!("{s} + gamma*(lag({s}, tau_1) + lag({s}, 10*tau_1) + lag({s}, 100*tau_1) - 3*{s})"))
-            .amplitude("gamma", "1", -0.3, 0.3)
+            .amplitude("gamma", "1", 0.0, 0.3)
             .shape("tau_1", "T", Grid::Values(vec![0.001, 0.003, 0.01]))
             .within(0.0001, 0.1)
     },

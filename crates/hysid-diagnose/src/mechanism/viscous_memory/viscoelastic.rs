@@ -12,7 +12,7 @@ pub static VISCOELASTIC: Mechanism = Mechanism {
     applies: |slot| slot.has("x"),
     already: &["lag(x, P)"],
     law: |_, _| {
-        Law::force("k_m*(x - lag(x, tau_m))").amplitude("k_m", "F/x", -0.5, 3.0).shape("tau_m", "t", Grid::Memory(6))
+        Law::force("k_m*(x - lag(x, tau_m))").amplitude("k_m", "F/x", 0.0, 3.0).shape("tau_m", "t", Grid::Memory(6))
     },
     contains: &[],
     confusable: &["sensor_lag", "delay", "bouc_wen"],
