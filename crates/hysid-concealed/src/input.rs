@@ -125,6 +125,8 @@ fn preisach(u: &[f64], p: &[f64], bend: f64) -> Vec<f64> {
         }
     }
     let total: f64 = relays.iter().map(|r| r.2).sum();
+    // An actuator's zero is where it rests: uneven relays that no swing reaches would be an offset and nothing else.
+    let rest: f64 = relays.iter().map(|r| r.2 * r.3).sum();
     u.iter()
         .map(|&value| {
             let w = value / u_max;
@@ -137,7 +139,7 @@ fn preisach(u: &[f64], p: &[f64], bend: f64) -> Vec<f64> {
                 }
                 sum += r.2 * r.3;
             }
-            (1.0 - share) * value + share * u_max * sum / total
+            (1.0 - share) * value + share * u_max * (sum - rest) / total
         })
         .collect()
 }

@@ -1,6 +1,7 @@
 //! One case: what is concealed where, the recordings, and the label.
 
 mod label;
+mod needed;
 mod noisy;
 mod simulation;
 
@@ -8,6 +9,7 @@ pub use label::{Concealed, Group, Label};
 pub use simulation::simulation;
 
 use self::label::concealed;
+use self::needed::{all_needed, simpler};
 use self::noisy::{add_noise, record};
 use crate::body::Kind;
 use crate::design::{Design, Source, suits};
@@ -114,7 +116,7 @@ impl Case {
         } else {
             tune(&design, &source, &units, dnr, noise_level, &seen)?
         };
-        if machine_is_silenced(&tuned) {
+        if machine_is_silenced(&tuned) || !all_needed(&design, &tuned) {
             return None;
         }
         let bits = 12 + random.below(5) as u32;
@@ -161,6 +163,10 @@ impl Case {
         let initial = if random.chance(0.3) { "\"free\"" } else { "0.0" };
         let simulation = simulation(&design, &declared, regularised, initial);
         let names = kind.parameters();
+        let mut effects: Vec<Concealed> = machine.effects.iter().map(|e| concealed(&design, e)).collect();
+        if let ([only], Some(law)) = (effects.as_mut_slice(), simpler(&design, &tuned)) {
+            only.same.push((law.name(), law.family()));
+        }
         let label = Label {
             id: wanted.id.clone(),
             group: wanted.group,
@@ -175,7 +181,7 @@ impl Case {
             bits,
             dnr_asked: if law.fixed() { tuned.dnr } else { dnr },
             dnr: if control { 0.0 } else { tuned.dnr },
-            effects: machine.effects.iter().map(|e| concealed(&design, e)).collect(),
+            effects,
             theta: names.iter().copied().zip(design.theta.iter().copied()).collect(),
             declared: names.iter().copied().zip(declared).collect(),
             rejected,
