@@ -8,6 +8,9 @@ use crate::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights};
 /// law looks like a small one.
 const TRIFLE: f64 = 0.02;
 
+/// Log likelihood by which a set must trail before the recording refutes it.
+const REFUTED: f64 = 4.0;
+
 /// Probabilities of the sets of a pool.
 pub fn likelihoods(
     pool: &[Hypothesis<'_>],
@@ -37,7 +40,8 @@ pub fn firmness(
     for (i, (e, s)) in best.effects.iter().zip(&mut support).enumerate() {
         // Two members of one family in one set: something of that kind, but neither of them as it stands.
         let twice = claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family);
-        if doubtful || twice || e.mechanism.family.stands_for_others() || trifle(pool, winner, i) {
+        let vague = e.mechanism.family.stands_for_others() || trifle(pool, winner, i) || has_twin(pool, winner, i);
+        if doubtful || twice || vague {
             s.weaken();
         }
         if bounded(&best.base, e) || e.mechanism.family.members_imitate() {
@@ -55,4 +59,24 @@ fn trifle(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let whole = pool[winner].log_evidence - pool[0].log_evidence;
     !rest.is_empty()
         && pool.iter().any(|h| h.key() == rest && pool[winner].log_evidence - h.log_evidence < TRIFLE * whole)
+}
+
+/// Whether a set with a member of the twin family in this member's place follows the recording as well. That it needs a parameter more makes
+/// it less likely, but refutes nothing: what is named firmly must be what the recording demands.
+fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
+    let best = &pool[winner];
+    let others = |h: &Hypothesis<'_>, family| {
+        let mut rest = h.key();
+        let place = h.effects.iter().position(|e| e.mechanism.family == family)?;
+        let id = h.effects[place].mechanism.id;
+        rest.retain(|(name, _)| *name != id);
+        Some(rest)
+    };
+    let Some(twin) = best.effects[member].mechanism.family.twin() else { return false };
+    let rest = others(best, best.effects[member].mechanism.family);
+    pool.iter().any(|h| {
+        h.effects.len() == best.effects.len()
+            && others(h, twin) == rest
+            && h.base.log_likelihood > best.base.log_likelihood - REFUTED
+    })
 }

@@ -13,6 +13,8 @@ use crate::verdict::{FIRM, Support};
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
+/// Odds against something more where a mismatch is known.
+pub const ODDS_AGAINST_MORE: f64 = 10.0;
 /// Share of a set's evidence that generic terms may add to it, and log evidence by which they may beat it alone, before it is an imitation.
 /// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
 const AS_MUCH: f64 = 0.5;
@@ -38,10 +40,10 @@ impl Left {
         let alpha = search.options.alpha;
         let test = (winner > 0).then(|| search.remains(best));
         let open = if significant { search.open(best) } else { None };
-        let seen = open.as_ref().filter(|o| unlikely(o) < alpha);
+        let seen = open.as_ref().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
         let explained = best.log_evidence - none.log_evidence;
         let alone = || {
-            let open = search.open(none).filter(|o| unlikely(o) < alpha);
+            let open = search.open(none).filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
             open.is_some_and(|o| o.gain > explained + FAR_MORE)
         };
         let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || alone());
@@ -53,7 +55,7 @@ impl Left {
     pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> RemainingRecord {
         let p = self.test.as_ref().map_or(1.0, |t| t.p_value);
         RemainingRecord {
-            p_value: p.min(self.open.as_ref().map_or(1.0, unlikely)),
+            p_value: p.min(self.open.as_ref().map_or(1.0, |o| unlikely(o, ODDS_AGAINST_MORE))),
             share: share(&pool[winner], &pool[0]),
         }
     }

@@ -20,7 +20,7 @@ use crate::records::*;
 use crate::report_values::{reported, sentence};
 use crate::screen::screen;
 use crate::search::{Search, calibrate, words};
-use crate::second_look::unlikely;
+use crate::second_look::{ODDS_AGAINST, unlikely};
 use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, verdict};
 use crate::weigh::*;
 
@@ -190,7 +190,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
                 search.by_chance(&none, &pool, candidates.len())
             }
         };
-        let seen = seen.or_else(|| search.open(&none).map(|o| unlikely(&o)).filter(|p| *p < options.alpha));
+        let seen =
+            seen.or_else(|| search.open(&none).map(|o| unlikely(&o, ODDS_AGAINST)).filter(|p| *p < options.alpha));
         if let Some(p) = seen {
             file.notes.push(format!(
                 "surrogates of the residual do not tell the mismatch from noise (p = {:.3}); effects that were fitted to it do (p = {p:.1e})",

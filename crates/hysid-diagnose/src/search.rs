@@ -11,11 +11,13 @@ use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all};
 use crate::hypothesis::{Hypothesis, Key, Setting};
+use crate::left::ODDS_AGAINST_MORE;
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
 use crate::openset::{OpenSet, correction};
 use crate::pipeline::{COMPOSING, Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
+use crate::second_look::unlikely;
 use crate::slot::Slot;
 
 /// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
@@ -111,7 +113,8 @@ impl<'a, 'd> Search<'a, 'd> {
         (self.hooks.progress)("looking for a second and third effect");
         let unexplained = |h: &Hypothesis<'_>| {
             let test = self.remains(h);
-            test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured()
+            let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured();
+            seen || self.open(h).is_some_and(|o| unlikely(&o, ODDS_AGAINST_MORE) < self.options.alpha)
         };
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
         let enough = || (self.hooks.expired)(COMPOSING);

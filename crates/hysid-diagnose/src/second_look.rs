@@ -7,7 +7,7 @@
 use crate::base::spared;
 use crate::compose::{short_list, superposed};
 use crate::fitting::refit_all;
-use crate::hypothesis::{Hypothesis, block_score};
+use crate::hypothesis::{Effect, Hypothesis, block_score};
 use crate::openset::OpenSet;
 use crate::screen::Candidate;
 use crate::search::Search;
@@ -21,18 +21,19 @@ const LARGE: f64 = 0.25;
 const SURE: f64 = 15.0;
 /// Share of the squared error on held-out blocks that noise never takes away.
 const HALF: f64 = 0.5;
-/// Odds against a mismatch before the recording is looked at, where a set says so and where generic terms do. The noise model is an estimate:
+/// Odds against a mismatch before the recording is looked at. The noise model is an estimate:
 /// on 43 development controls (seeds 3 and 5) under six kinds of noise the best of the sets gained at most 7.2 nats, four times more than 4,
 /// on one more (process noise on a drive, seed 7) 13.3.
-const ODDS_AGAINST: f64 = 1000.0;
-const ODDS_AGAINST_TERMS: f64 = 10.0;
+pub const ODDS_AGAINST: f64 = 1000.0;
+/// Moments of a recording that are apart for an effect that begins at one of them.
+const MOMENTS: f64 = 25.0;
 /// Log evidence that a set of nothing but drifts must bring besides: noise that rises towards low frequency does what they do. On
 /// development controls a drift gained at most 10.4 nats (process noise on a drive).
 const SLOW: f64 = 8.0;
 
 /// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
-pub fn unlikely(open: &OpenSet) -> f64 {
-    if open.block_ratio < 1.0 { (ODDS_AGAINST_TERMS * (-open.gain).exp()).min(1.0) } else { 1.0 }
+pub fn unlikely(open: &OpenSet, odds_against: f64) -> f64 {
+    if open.block_ratio < 1.0 { (odds_against * (-open.gain).exp()).min(1.0) } else { 1.0 }
 }
 
 impl<'d> Search<'_, 'd> {
@@ -51,7 +52,9 @@ impl<'d> Search<'_, 'd> {
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
         let sets = |h: &Hypothesis<'_>| {
             (0..h.effects.len())
-                .map(|i| (candidates.saturating_sub(i) as f64 / (i + 1) as f64).max(1.0))
+                .map(|i| {
+                    (candidates.saturating_sub(i) as f64 / (i + 1) as f64).max(1.0) * self.places_of(&h.effects[i])
+                })
                 .product::<f64>()
         };
         let evidence = |h: &Hypothesis<'_>| {
@@ -68,6 +71,15 @@ impl<'d> Search<'_, 'd> {
         let (_, before) = block_score(self.setting, start)?;
         let (_, after) = block_score(self.setting, best)?;
         (after.iter().sum::<f64>() < before.iter().sum::<f64>()).then_some(p)
+    }
+
+    /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.
+    fn places_of(&self, effect: &Effect) -> f64 {
+        match effect.mechanism.id {
+            "periodic_disturbance" => (0.5 * self.setting.data.rows() as f64).max(1.0),
+            "abrupt_change" => MOMENTS,
+            _ => 1.0,
+        }
     }
 
     /// The same where the residual is mismatch throughout and no noise model can be had: a set that takes [`LARGE`] of its power or brings

@@ -120,6 +120,18 @@ impl Family {
         self == Self::LinearMemory || self.is_slow_noise()
     }
 
+    /// The family one of whose members becomes one of this family's by a single parameter: Dahl's law is Bouc and Wen's with `gamma = 0`, a
+    /// back-EMF that the viscous friction absorbs leaves the lag of the winding.
+    pub fn twin(self) -> Option<Self> {
+        match self {
+            Self::Presliding => Some(Self::HystereticSpring),
+            Self::HystereticSpring => Some(Self::Presliding),
+            Self::SignalPathLag => Some(Self::Electrical),
+            Self::Electrical => Some(Self::SignalPathLag),
+            _ => None,
+        }
+    }
+
     /// Whether its members are what noise of low frequency does: no noise model of a recording's own length can tell.
     pub fn is_slow_noise(self) -> bool {
         self == Self::SensorDrift

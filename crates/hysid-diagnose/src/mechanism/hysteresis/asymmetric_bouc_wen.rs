@@ -12,7 +12,7 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
     applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
     already: &[],
     law: |_, _| {
-        // The share a makes z tend to 1/(1 + a)^(1/n) upwards and to 1/(1 - a)^(1/n) downwards.
+        // The share a makes z tend to 1/(1 + 2 a)^(1/n) upwards and to 1/(1 - 2 a)^(1/n) downwards.
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 3.0, 4))
@@ -22,16 +22,16 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
             .within(0.3, 5.0)
             .shape("n_z", "1", Grid::Values(vec![1.0]))
             .within(1.0, 6.0)
-            .shape("a_z", "1", Grid::Values(vec![-0.3, 0.3]))
-            .within(-0.9, 0.9)
-            .state("z", "1", "(v - abs(z)^(n_z - 1)*(b*abs(v)*z + (1 - b)*v*abs(z) + a_z*v*z))/x_y")
+            .shape("a_z", "1", Grid::Values(vec![-0.15, 0.15]))
+            .within(-0.45, 0.45)
+            .state("z", "1", "(v - abs(z)^(n_z - 1)*(b*abs(v)*z + (1 - b)*v*abs(z) + a_z*(v*z + abs(v)*abs(z))))/x_y")
             .report("k_h", "F/x", "F_h/x_y")
             .report("gamma_over_beta", "1", "(1 - b)/b")
     },
     contains: &["bouc_wen", "dahl_friction"],
     confusable: &["bouc_wen", "quadratic_stiffness"],
     needs: &[Need::Reversals("v", 6), Need::BothSides("x"), Need::Levels("x", 1.5)],
-    sentence: "A hysteretic spring with unequal branches acts {place}: it yields over {x_y} at {F_h}, the branches differing by the share {a_z}.",
+    sentence: "A hysteretic spring with unequal branches acts {place}: it yields over {x_y} at {F_h}, the branches differing by twice the share {a_z}.",
     signature: "Unequal upper and lower branches; even harmonics together with a loop.",
     reference: "C.-H. Wang, Y.-K. Wen, Evaluation of pre-Northridge low-rise steel buildings I: modeling, J. Struct. Eng. 126 (2000) 1151-1160",
 };
