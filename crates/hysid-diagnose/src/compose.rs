@@ -181,7 +181,7 @@ fn extended<'d>(
     options: SearchOptions,
     dropped: Option<&Effect>,
 ) -> Vec<Hypothesis<'d>> {
-    let candidates = screen(&parent.base, &setting.original, &parent.base.evidence(), &|_, _| true);
+    let candidates = screen(&parent.base, &setting.original, &parent.effects, &parent.base.evidence(), &|_, _| true);
     if candidates.first().is_none_or(|c| c.score() < 2.0) {
         return Vec::new();
     }

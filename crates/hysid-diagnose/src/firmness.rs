@@ -8,6 +8,8 @@ use crate::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights};
 /// law looks like a small one.
 const TRIFLE: f64 = 0.02;
 
+/// Laws that are the sum of two others: friction that is unequal in the two directions is dry friction and a constant force, sticking included.
+const SUMS: &[&str] = &["asymmetric_friction"];
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
 
@@ -44,7 +46,7 @@ pub fn firmness(
         if doubtful || twice || vague {
             s.weaken();
         }
-        if bounded(&best.base, e) || e.mechanism.family.members_imitate() {
+        if bounded(&best.base, e) || e.mechanism.family.members_imitate() || SUMS.contains(&e.mechanism.id) {
             s.mechanism = s.mechanism.min(NOT_FIRM);
         }
     }

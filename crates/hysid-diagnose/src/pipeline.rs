@@ -140,7 +140,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("looking for what could be missing");
     let evidence = none.base.evidence();
-    let mut candidates = screen(&none.base, simulation, &evidence, &|_, _| true);
+    let mut candidates = screen(&none.base, simulation, &[], &evidence, &|_, _| true);
     let residual_rms = by_column(simulation, &data.layout.rms(&none.base.fit.residual));
     let detectable = detectability(&candidates);
     let mut file = DiagnosisFile {

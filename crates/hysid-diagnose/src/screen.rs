@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::base::Base;
 use crate::evidence::{FeatureGroup, Projector, norm2, score};
+use crate::hypothesis::Effect;
 use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, catalogue};
 use crate::model::{Model, Values};
 use crate::slot::{Slot, Structure};
@@ -160,23 +161,27 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Opti
 
 /// Everything in the catalogue that can be missing in this simulation, with its columns, best score first.
 ///
-/// `original` is the user's simulation: slots are those of it, with what stands there now.
+/// `original` is the user's simulation: slots are those of it, with what stands there now. What looks as if a slot had it already is a
+/// candidate still where it looks so by an effect of another family among `effects`.
 pub fn screen(
     base: &Base<'_>,
     original: &Simulation,
+    effects: &[Effect],
     evidence: &(Projector, Vec<f64>),
     keep: &dyn Fn(&Mechanism, &Slot) -> bool,
 ) -> Vec<Candidate> {
     let (own, r) = evidence;
     let document = base.document();
     let structure = Structure::within(&document, original);
+    let bare = Structure::within(original, original);
     let peaks = residual_peaks(base);
     let at = signals(base, &structure, &peaks);
     let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();
     for mechanism in catalogue() {
-        for slot in mechanism.slots(&structure) {
-            let Some(place) = structure.slots.iter().position(|s| *s == slot) else { continue };
-            if !keep(mechanism, &structure.slots[place]) {
+        for (place, slot) in structure.slots.iter().enumerate() {
+            let theirs = effects.iter().any(|e| e.slot.label == slot.label && e.mechanism.family == mechanism.family);
+            let added = || !theirs && !bare.slots.iter().any(|b| b.label == slot.label && mechanism.is_in(b));
+            if !mechanism.fits(slot) || (mechanism.is_in(slot) && !added()) || !keep(mechanism, slot) {
                 continue;
             }
             if let Some(signals) = &at[place] {

@@ -67,6 +67,8 @@ const MOST_CARRIED: usize = 8;
 /// Composition goes on too while a candidate scores this much around a hypothesis: surrogates of a residual that is mostly mismatch score as
 /// high as the mismatch itself, and their p-value says nothing.
 const STOP_SCORE: f64 = 25.0;
+/// Rounds in which the rivals of the best single effect are fitted to the end.
+const HEARINGS: usize = 2;
 /// Candidates that are refitted alone.
 const SHORT_LIST: usize = 10;
 
@@ -94,7 +96,7 @@ impl<'a, 'd> Search<'a, 'd> {
     pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
         let base = self.setting.fit(&self.setting.original, &none.base.values(), None, 2, 25)?;
         let start = self.setting.hypothesis(Vec::new(), base);
-        let candidates = screen(&start.base, &self.setting.original, &start.base.evidence(), &|_, _| true);
+        let candidates = screen(&start.base, &self.setting.original, &[], &start.base.evidence(), &|_, _| true);
         Some((start, candidates))
     }
 
@@ -104,8 +106,15 @@ impl<'a, 'd> Search<'a, 'd> {
         for h in refit_all(self.setting, none, &short_list(candidates, SHORT_LIST)) {
             add(pool, h);
         }
-        for h in refit_all(self.setting, none, &unheard(pool, candidates)) {
-            add(pool, h);
+        // One hearing may bring another best effect, whose rivals are others.
+        for _ in 0..HEARINGS {
+            let list = unheard(pool, candidates);
+            if list.is_empty() || (self.hooks.expired)(COMPOSING) {
+                break;
+            }
+            for h in refit_all(self.setting, none, &list) {
+                add(pool, h);
+            }
         }
         if let Some(h) = crate::numerics_check::artefact(self.setting, none) {
             add(pool, h);
@@ -147,7 +156,7 @@ impl<'a, 'd> Search<'a, 'd> {
             let parent = set.as_ref().unwrap_or(none);
             let evidence = parent.base.evidence();
             let wanted = |m: &Mechanism, s: &Slot| m.id == *mechanism && s.label == *slot;
-            let found = screen(&parent.base, &self.setting.original, &evidence, &wanted);
+            let found = screen(&parent.base, &self.setting.original, &parent.effects, &evidence, &wanted);
             let Some(candidate) = found.first() else {
                 return Err(DiagnoseError::Question(format!("{mechanism}@{slot}")));
             };
@@ -172,7 +181,7 @@ impl<'a, 'd> Search<'a, 'd> {
             return known.clone();
         }
         let evidence = h.base.evidence();
-        let rest = screen(&h.base, &self.setting.original, &evidence, &|_, _| true);
+        let rest = screen(&h.base, &self.setting.original, &h.effects, &evidence, &|_, _| true);
         let test = self.test(&rest, &h.base, &evidence);
         self.tests.borrow_mut().insert(key, test.clone());
         test

@@ -224,7 +224,11 @@ fn companion(kind: Kind, have: &[Law], random: &mut Random) -> Option<Law> {
     let clash = |a: Law, b: Law| {
         let hysteresis = |l: Law| matches!(l.family(), "actuator_hysteresis" | "play");
         let friction = |l: Law| matches!(l.family(), "dry_friction" | "presliding" | "hysteretic_spring");
+        // Friction that is unequal in the two directions is dry friction and a constant force, sticking included: one machine, three labels.
+        let unequal = |a: Law, b: Law| a.family() == "dry_friction" && b.family() == "bias";
         a.family() == b.family()
+            || unequal(a, b)
+            || unequal(b, a)
             || (hysteresis(a) && hysteresis(b))
             || (friction(a) && friction(b))
             || (a.place() == Place::Parameter && b.place() == Place::Parameter)

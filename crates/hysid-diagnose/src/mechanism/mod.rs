@@ -90,8 +90,12 @@ impl Mechanism {
     /// The slots of a simulation at which this mechanism is a candidate: of the right kind, and the baseline has not got it
     /// there.
     pub fn slots(&self, structure: &Structure) -> Vec<Slot> {
-        let fits = |slot: &&Slot| self.places.contains(&slot.place) && (self.applies)(slot) && !self.is_in(slot);
-        structure.slots.iter().filter(fits).cloned().collect()
+        structure.slots.iter().filter(|slot| self.fits(slot) && !self.is_in(slot)).cloned().collect()
+    }
+
+    /// Whether the slot is of the right kind.
+    pub fn fits(&self, slot: &Slot) -> bool {
+        self.places.contains(&slot.place) && (self.applies)(slot)
     }
 
     /// Whether the baseline already has this mechanism at the slot.
