@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::fitting::{HOPELESS, Part, assemble, complete, refit_all, without};
-use crate::hypothesis::{Effect, Hypothesis, Setting};
+use crate::hypothesis::{Effect, Hypothesis, Key, Setting};
 use crate::joint::pairs;
 use crate::mechanism::Mechanism;
 use crate::screen::{Candidate, screen};
@@ -52,14 +52,16 @@ fn rivals_of<'c>(effect: &Effect, candidates: &'c [Candidate]) -> Vec<&'c Candid
 }
 
 /// What is easily taken for the best single effect of a pool and was not fitted yet, or given up after a few iterations.
-pub fn unheard<'c>(pool: &[Hypothesis<'_>], candidates: &'c [Candidate]) -> Vec<&'c Candidate> {
+///
+/// `given` are statements that were heard to the end.
+pub fn unheard<'c>(pool: &[Hypothesis<'_>], candidates: &'c [Candidate], given: &[Key]) -> Vec<&'c Candidate> {
     let alone = |h: &&Hypothesis<'_>| h.effects.len() == 1;
     let Some(best) = pool.iter().filter(alone).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
         return Vec::new();
     };
     let heard = |c: &&Candidate| {
-        let key = [(c.mechanism.id, c.slot.label.clone())];
-        pool.iter().any(|h| h.key() == key && h.log_evidence > best.log_evidence - HOPELESS)
+        let key = c.key();
+        given.contains(&key) || pool.iter().any(|h| h.key() == key && h.log_evidence > best.log_evidence - HOPELESS)
     };
     rivals_of(&best.effects[0], candidates).into_iter().filter(|c| !heard(c)).take(SECOND_HEARING).collect()
 }

@@ -310,6 +310,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if left.is_outside(&support, file.remaining.as_ref()) {
         file.verdict = VerdictKind::NotInCatalogue;
     }
+    if significant && file.verdict == VerdictKind::NoSignificantMismatch {
+        file.notes.push("simulation and recording differ by more than the surrogates do, but no effect and no generic term explains it: nothing is claimed".into());
+    }
     if left.foreign && !vetoed {
         file.notes.push("the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input".into());
     }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::base::Base;
 use crate::evidence::{FeatureGroup, Projector, norm2, score};
-use crate::hypothesis::Effect;
+use crate::hypothesis::{Effect, Key};
 use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, catalogue};
 use crate::model::{Model, Values};
 use crate::slot::{Slot, Structure};
@@ -58,6 +58,11 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// The statement that it makes alone.
+    pub fn key(&self) -> Key {
+        vec![(self.mechanism.id, self.slot.label.clone())]
+    }
+
     /// Its largest score.
     pub fn score(&self) -> f64 {
         self.points.first().map_or(f64::NEG_INFINITY, |p| p.score)

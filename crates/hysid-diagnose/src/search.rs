@@ -107,11 +107,13 @@ impl<'a, 'd> Search<'a, 'd> {
             add(pool, h);
         }
         // One hearing may bring another best effect, whose rivals are others.
+        let mut given: Vec<Key> = Vec::new();
         for _ in 0..HEARINGS {
-            let list = unheard(pool, candidates);
+            let list = unheard(pool, candidates, &given);
             if list.is_empty() || (self.hooks.expired)(COMPOSING) {
                 break;
             }
+            given.extend(list.iter().map(|c| c.key()));
             for h in refit_all(self.setting, none, &list) {
                 add(pool, h);
             }
