@@ -10,6 +10,8 @@
 
 mod algebra;
 mod find;
+mod forces;
+mod motion;
 mod pattern;
 
 use std::collections::BTreeMap;
@@ -19,7 +21,7 @@ use hysid_plant::{Expr, Simulation, Unit};
 
 pub use find::Structure;
 
-pub(crate) use find::{ForcePath, force_path};
+pub(crate) use motion::{ForcePath, force_path};
 
 /// What kind of place a slot is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,0 +1,168 @@
+//! The slots at which forces stand: on a moving part, between two of them, at the output of a static force law.
+
+use hysid_plant::Expr;
+
+use super::algebra::{has_free_constant, linear_coefficient, only_parameters, size};
+use super::find::Finder;
+use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
+use super::{Place, Slot, Target};
+
+impl Finder<'_> {
+    /// Offers what every force slot has: the size of the forces, the mass, the linear stiffness and damping.
+    pub(super) fn offer_force(&self, slot: &mut Slot, derivative: &Expr, x: Option<&str>, v: &str) {
+        let simulation = self.simulation;
+        let below = |symbol: &str, force: &Expr| Some((-linear_coefficient(simulation, force, symbol)?).simplified());
+        let (force, mass) = match force_path(simulation, derivative) {
+            ForcePath::Quotient(force, mass) => {
+                slot.offer(simulation, "F", size(force));
+                (force, Some(mass))
+            }
+            ForcePath::Divided(mass) => {
+                slot.offer(simulation, "F", mass.clone() * size(derivative));
+                (derivative, Some(mass))
+            }
+            ForcePath::Bare => {
+                slot.offer(simulation, "F", size(derivative));
+                (derivative, None)
+            }
+        };
+        let quotient = matches!(force_path(simulation, derivative), ForcePath::Divided(_));
+        let scaled = |e: Expr| match mass {
+            Some(mass) if quotient => (mass.clone() * e).simplified(),
+            _ => e,
+        };
+        if let Some(k) = x.and_then(|x| below(x, force)) {
+            slot.offer(simulation, "k", scaled(k));
+        }
+        if let Some(c) = below(v, force) {
+            slot.offer(simulation, "c", scaled(c));
+        }
+        if let Some(mass) = mass.filter(|m| only_parameters(simulation, m)) {
+            slot.offer(simulation, "m", mass.clone());
+        }
+        if let Some(input) = simulation.inputs.iter().find(|i| force.uses(&i.symbol)) {
+            slot.offer(simulation, "u", Expr::symbol(&input.symbol));
+        }
+        slot.constant = has_free_constant(simulation, force);
+    }
+
+    pub(super) fn motion_slot(&self, place: Place, label: String, motion: &Motion<'_>) -> Slot {
+        let target = Target::Derivatives(vec![(motion.v.to_owned(), 1.0)]);
+        let mut slot = Slot::new(place, label, format!("at {}", motion.name()), target);
+        let v = Expr::symbol(motion.v);
+        slot.loops = self.loops(&v);
+        slot.offer(self.simulation, "v", v);
+        if let Some(x) = motion.x {
+            slot.offer(self.simulation, "x", Expr::symbol(x));
+            if let Some(rad) = self.simulation.unit_of(x).as_ref().and_then(angle) {
+                slot.offer(self.simulation, "rad", rad);
+            }
+        }
+        self.offer_force(&mut slot, motion.derivative, motion.x, motion.v);
+        slot.context = vec![motion.derivative.clone()];
+        slot
+    }
+
+    pub(super) fn forces(&self) -> Vec<Slot> {
+        self.motions.iter().map(|m| self.motion_slot(Place::Force, format!("state:{}", m.v), m)).collect()
+    }
+
+    pub(super) fn connections(&self) -> Vec<Slot> {
+        let mut slots = Vec::new();
+        for (i, one) in self.motions.iter().enumerate() {
+            for other in &self.motions[i + 1..] {
+                let (Some(x1), Some(x2)) = (one.x, other.x) else { continue };
+                let units = (self.simulation.unit_of(x1), self.simulation.unit_of(x2));
+                let alike = match &units {
+                    (Some(a), Some(b)) => a.same_dimension(b),
+                    _ => true,
+                };
+                if !(alike && one.derivative.uses(x2) && other.derivative.uses(x1)) {
+                    continue;
+                }
+                let target = Target::Derivatives(vec![(one.v.to_owned(), 1.0), (other.v.to_owned(), -1.0)]);
+                let mut slot =
+                    Slot::new(Place::Connection, format!("state:{}", one.v), format!("between {x1} and {x2}"), target);
+                let v = Expr::symbol(one.v) - Expr::symbol(other.v);
+                slot.loops = self.loops(&v);
+                slot.offer(self.simulation, "x", Expr::symbol(x1) - Expr::symbol(x2));
+                slot.offer(self.simulation, "v", v);
+                let force = match force_path(self.simulation, one.derivative) {
+                    ForcePath::Quotient(force, _) => force,
+                    _ => one.derivative,
+                };
+                let divided = match force_path(self.simulation, one.derivative) {
+                    ForcePath::Divided(mass) => Some(mass.clone()),
+                    _ => None,
+                };
+                let whole = |e: Expr| match &divided {
+                    Some(mass) => (mass.clone() * e).simplified(),
+                    None => e,
+                };
+                let coupling = force.terms().into_iter().filter(|(_, t)| t.uses(x2) || t.uses(other.v));
+                if let Some(size) = coupling.map(|(_, t)| t.clone().abs()).reduce(|a, b| a + b) {
+                    slot.offer(self.simulation, "F", whole(size));
+                }
+                if let Some(k) = linear_coefficient(self.simulation, force, x2) {
+                    slot.offer(self.simulation, "k", whole(k));
+                }
+                if let Some(c) = linear_coefficient(self.simulation, force, other.v) {
+                    slot.offer(self.simulation, "c", whole(c));
+                }
+                slot.context = vec![one.derivative.clone()];
+                slots.push(slot);
+            }
+        }
+        slots
+    }
+
+    pub(super) fn force_laws(&self) -> Vec<Slot> {
+        if !self.is_force_law() {
+            return Vec::new();
+        }
+        let of_kind = |kind: Kinematic| {
+            let inputs = self.simulation.inputs.iter();
+            inputs.map(|i| i.symbol.as_str()).filter(|s| self.kinematic_input(s) == kind).collect::<Vec<_>>()
+        };
+        let (displacements, velocities) = (of_kind(Kinematic::Displacement), of_kind(Kinematic::Velocity));
+        let mut slots = Vec::new();
+        for output in &self.simulation.outputs {
+            for i in 0..displacements.len().max(velocities.len()) {
+                let x = displacements.get(i).copied();
+                let v = match (velocities.get(i), x) {
+                    (Some(v), _) => Expr::symbol(*v),
+                    (None, Some(x)) => Expr::symbol(x).derivative_of_input(),
+                    (None, None) => continue,
+                };
+                let mut slot = Slot::new(
+                    Place::ForceLaw,
+                    format!("output:{}", output.column),
+                    format!("in {}", output.column),
+                    Target::Output(output.column.clone()),
+                );
+                slot.loops = self.loops(&v);
+                if let Some(v) = velocities.get(i) {
+                    if let Some(c) = linear_coefficient(self.simulation, &output.expression, v) {
+                        slot.offer(self.simulation, "c", c);
+                    }
+                }
+                slot.offer(self.simulation, "v", v);
+                if let Some(x) = x {
+                    slot.offer(self.simulation, "x", Expr::symbol(x));
+                    if let Some(k) = linear_coefficient(self.simulation, &output.expression, x) {
+                        slot.offer(self.simulation, "k", k);
+                    }
+                    if let Some(rad) = self.simulation.unit_of(x).as_ref().and_then(angle) {
+                        slot.offer(self.simulation, "rad", rad);
+                    }
+                }
+                slot.offer(self.simulation, "F", output.expression.clone());
+                self.name_unit(&mut slot, "F", &output.column);
+                slot.context = self.equations();
+                slot.constant = has_free_constant(self.simulation, &output.expression);
+                slots.push(slot);
+            }
+        }
+        slots
+    }
+}

@@ -1,0 +1,108 @@
+//! What moves in a simulation: velocities with their displacements, told by the equations, by units, by names; how a force enters.
+
+use hysid_plant::{BinaryOp, Expr, Simulation, Unit};
+
+use super::algebra::only_parameters;
+
+/// How forces enter the derivative of a velocity.
+pub(crate) enum ForcePath<'a> {
+    /// `(force)/mass`.
+    Quotient(&'a Expr, &'a Expr),
+    /// A sum of terms that are all divided by the same mass.
+    Divided(&'a Expr),
+    /// No mass in sight: a force has the unit of the derivative.
+    Bare,
+}
+
+/// The force path of a derivative.
+pub(crate) fn force_path<'a>(simulation: &Simulation, derivative: &'a Expr) -> ForcePath<'a> {
+    fn divisor(term: &Expr) -> Option<&Expr> {
+        match term {
+            Expr::Binary(BinaryOp::Div, _, below) => Some(below),
+            Expr::Binary(BinaryOp::Mul, a, b) => divisor(a).or_else(|| divisor(b)),
+            Expr::Neg(a) => divisor(a),
+            _ => None,
+        }
+    }
+    if let Expr::Binary(BinaryOp::Div, above, below) = derivative {
+        return ForcePath::Quotient(above, below);
+    }
+    let mut divisors = derivative.terms().into_iter().map(|(_, term)| divisor(term));
+    match divisors.next().flatten() {
+        Some(mass) if only_parameters(simulation, mass) && divisors.all(|d| d == Some(mass)) => {
+            ForcePath::Divided(mass)
+        }
+        _ => ForcePath::Bare,
+    }
+}
+
+/// A moving part: a velocity, mostly with its displacement.
+pub(super) struct Motion<'a> {
+    pub x: Option<&'a str>,
+    pub v: &'a str,
+    pub derivative: &'a Expr,
+}
+
+impl Motion<'_> {
+    pub fn name(&self) -> &str {
+        self.x.unwrap_or(self.v)
+    }
+}
+
+/// What a quantity is by its unit, else by its name.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kinematic {
+    Displacement,
+    Velocity,
+    Neither,
+}
+
+pub(super) fn kinematic(unit: Option<&Unit>, name: &str) -> Kinematic {
+    let Some(unit) = unit else {
+        return match name.to_ascii_lowercase().as_str() {
+            "x" | "q" | "z" | "disp" | "displacement" | "pos" | "position" | "theta" | "phi" | "alpha" | "angle" => {
+                Kinematic::Displacement
+            }
+            "v" | "vel" | "velocity" | "speed" | "omega" | "xdot" | "dx" | "x_dot" => Kinematic::Velocity,
+            _ => Kinematic::Neither,
+        };
+    };
+    let like = |text: &str| Unit::parse(text).is_ok_and(|u| unit.same_dimension(&u));
+    if like("m") || angle(unit).is_some() {
+        Kinematic::Displacement
+    } else if like("m/s") || matches!(unit.to_string().as_str(), "rad/s" | "deg/s" | "rev/s" | "rpm") {
+        Kinematic::Velocity
+    } else {
+        Kinematic::Neither
+    }
+}
+
+/// The factor that turns a unit of angle into radians.
+pub(super) fn angle(unit: &Unit) -> Option<Expr> {
+    match unit.to_string().as_str() {
+        "rad" => Some(Expr::Number(1.0)),
+        "mrad" => Some(Expr::Number(1e-3)),
+        "deg" => Some(Expr::symbol("pi") / 180.0),
+        "rev" | "turn" => Some(Expr::symbol("pi") * 2.0),
+        _ => None,
+    }
+}
+
+pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> Vec<Motion<'a>> {
+    let known = || simulation.states.iter().filter(|s| original.state(&s.name).is_some());
+    let mut found = Vec::new();
+    for velocity in known() {
+        let position = known().find(|s| s.derivative == Expr::symbol(&velocity.name));
+        // A chain x' = v, v' = a, a' = ...: v is then a displacement's velocity only, not one with a force.
+        let passes_on = matches!(&velocity.derivative, Expr::Symbol(s) if original.state(s).is_some());
+        let alone = kinematic(velocity.unit.as_ref(), &velocity.name) == Kinematic::Velocity;
+        if !passes_on && (position.is_some() || alone) {
+            found.push(Motion {
+                x: position.map(|s| s.name.as_str()),
+                v: &velocity.name,
+                derivative: &velocity.derivative,
+            });
+        }
+    }
+    found
+}
