@@ -22,13 +22,19 @@ pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
     // Siblings of the best must be heard: the verdict turns on them.
     if let Some(best) = candidates.first() {
         for c in candidates {
-            let rival = rivals(best.mechanism, c.mechanism) && c.slot.label == best.slot.label;
-            if rival && !list.iter().any(|l| std::ptr::eq(*l, c)) {
-                list.push(c);
+            if rivals(best.mechanism, c.mechanism) && c.slot.label == best.slot.label {
+                include(&mut list, c);
             }
         }
     }
     list
+}
+
+/// Adds a candidate that is not in the list yet.
+fn include<'c>(list: &mut Vec<&'c Candidate>, c: &'c Candidate) {
+    if !list.iter().any(|l| std::ptr::eq(*l, c)) {
+        list.push(c);
+    }
 }
 
 /// Whether two mechanisms are easily taken for each other.
@@ -189,9 +195,7 @@ fn extended<'d>(
     }
     let mut list = short_list(&candidates, options.most);
     for rival in dropped.map_or_else(Vec::new, |d| rivals_of(d, &candidates)) {
-        if !list.iter().any(|l| std::ptr::eq(*l, rival)) {
-            list.push(rival);
-        }
+        include(&mut list, rival);
     }
     refit_all(setting, parent, &list)
 }

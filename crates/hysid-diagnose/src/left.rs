@@ -8,13 +8,11 @@ use crate::hypothesis::Hypothesis;
 use crate::openset::OpenSet;
 use crate::records::noise_floor;
 use crate::search::Search;
-use crate::second_look::unlikely;
+use crate::second_look::{ODDS_AGAINST_MORE, unlikely};
 use crate::verdict::{FIRM, Support};
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
-/// Odds against something more where a mismatch is known.
-pub const ODDS_AGAINST_MORE: f64 = 10.0;
 /// Share of a set's evidence that generic terms may add to it, and log evidence by which they may beat it alone, before it is an imitation.
 /// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
 const AS_MUCH: f64 = 0.5;

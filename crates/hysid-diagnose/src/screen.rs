@@ -178,7 +178,7 @@ pub fn screen(
     let (own, r) = evidence;
     let document = base.document();
     let structure = Structure::within(&document, original);
-    let bare = Structure::within(original, original);
+    let bare = Structure::of(original);
     let peaks = residual_peaks(base);
     let at = signals(base, &structure, &peaks);
     let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();

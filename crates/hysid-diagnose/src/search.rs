@@ -11,13 +11,12 @@ use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all};
 use crate::hypothesis::{Hypothesis, Key, Setting};
-use crate::left::ODDS_AGAINST_MORE;
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
 use crate::openset::{OpenSet, correction};
 use crate::pipeline::{COMPOSING, Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
-use crate::second_look::unlikely;
+use crate::second_look::{ODDS_AGAINST_MORE, unlikely};
 use crate::slot::Slot;
 
 /// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.

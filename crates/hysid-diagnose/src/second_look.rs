@@ -25,6 +25,8 @@ const HALF: f64 = 0.5;
 /// on 43 development controls (seeds 3 and 5) under six kinds of noise the best of the sets gained at most 7.2 nats, four times more than 4,
 /// on one more (process noise on a drive, seed 7) 13.3.
 pub const ODDS_AGAINST: f64 = 1000.0;
+/// Odds against something more where a mismatch is known.
+pub const ODDS_AGAINST_MORE: f64 = 10.0;
 /// Moments of a recording that are apart for an effect that begins at one of them.
 const MOMENTS: f64 = 25.0;
 /// Log evidence that a set of nothing but drifts must bring besides: noise that rises towards low frequency does what they do. On

@@ -14,9 +14,7 @@ const ROUNDS: usize = 10;
 /// `N DNR^2` of what is left when these effects, refitted with the plant, stand for the true ones.
 fn left(design: &Design, tuned: &Tuned, effects: Vec<Effect>) -> Option<f64> {
     let target = Target { input: &tuned.input, y: &tuned.y };
-    let mut machine = design.machine(effects);
-    machine.regularised = design.baseline(&tuned.machine.effects).regularised;
-    let fitted = refit(&machine, target, &tuned.sigma, Scope::Effects, false, ROUNDS)?;
+    let fitted = refit(&design.machine(effects), target, &tuned.sigma, Scope::Effects, false, ROUNDS)?;
     Some(design.samples as f64 * fitted.rms.powi(2))
 }
 

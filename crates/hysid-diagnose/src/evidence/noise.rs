@@ -3,7 +3,8 @@
 //! An autoregression of order 16 resolves a sixteenth of the sampling frequency. Noise that rises towards low frequency (1/f, drift of a
 //! sensor) and a slow mismatch in a recording that was sampled a hundred times faster both lie below that. Without the shape such a
 //! residual would count as white, and a model that removes it would gain nothing in likelihood. The shape is piecewise linear in the
-//! logarithms of frequency and power, with knots one or two octaves apart, fitted by Whittle's likelihood; BIC decides whether it is there.
+//! logarithms of frequency and power, with knots one or two octaves apart or a single corner, fitted by Whittle's likelihood; BIC decides
+//! whether it is there.
 //!
 //! Whitening divides the discrete Fourier transform of the autoregression's innovations by the root of the shape: an orthogonal transform, a
 //! scaling, and back. The rows stay in order of time. The residual's wrap from end to start is the approximation (the autoregression has
@@ -103,8 +104,8 @@ impl SpectralShape {
     }
 
     /// Number of coefficients: heights, and the place of a single corner.
-    fn coefficients(&self) -> f64 {
-        self.heights.len() as f64 + if self.heights.len() == 3 { 1.0 } else { 0.0 }
+    fn coefficients(&self) -> usize {
+        self.heights.len() + usize::from(self.heights.len() == 3)
     }
 
     /// Half the logarithm of the determinant of `n` samples' covariance.
@@ -197,10 +198,10 @@ impl ArModel {
         let price = 0.5 * (total as f64).ln();
         let mut best: (Option<SpectralShape>, f64) = (None, 0.0);
         for knots in shapes {
-            if let Some((shape, gain)) = SpectralShape::fit(knots.clone(), &lines)
-                && gain - price * shape.coefficients() > best.1
-            {
-                best = (Some(shape.clone()), gain - price * shape.coefficients());
+            let Some((shape, gain)) = SpectralShape::fit(knots.clone(), &lines) else { continue };
+            let gain = gain - price * shape.coefficients() as f64;
+            if gain > best.1 {
+                best = (Some(shape), gain);
             }
         }
         NoiseModel { ar: self, shape: best.0 }
@@ -231,14 +232,15 @@ impl NoiseModel {
         }
         let bent = corners(longest);
         let mut best = whole.ar.shaped(stretches, &[even_knots(longest), bent.clone()].concat());
-        let mut seen = vec![best.order()];
+        let (mut most, mut seen) = (best.score(stretches), vec![best.order()]);
         for order in SHORT_ORDERS {
             let short = fit_ar(stretches, order);
             if !seen.contains(&short.order()) {
                 seen.push(short.order());
                 let shaped = short.shaped(stretches, &bent);
-                if shaped.score(stretches) > best.score(stretches) {
-                    best = shaped;
+                let score = shaped.score(stretches);
+                if score > most {
+                    (best, most) = (shaped, score);
                 }
             }
         }
@@ -261,7 +263,7 @@ impl NoiseModel {
 
     /// Number of coefficients beyond the scale.
     pub fn coefficients(&self) -> usize {
-        self.ar.order() + self.shape.as_ref().map_or(0, |s| s.coefficients() as usize)
+        self.ar.order() + self.shape.as_ref().map_or(0, SpectralShape::coefficients)
     }
 
     /// Order of the autoregression.
