@@ -14,6 +14,7 @@ pub mod integrate;
 pub mod law;
 pub mod machine;
 pub mod noise;
+pub mod oracle;
 pub mod refit;
 pub mod seed;
 pub mod strength;

@@ -1,7 +1,8 @@
 //! Least-squares refit of a machine's parameters by damped Gauss-Newton with finite differences: the bank's own recalibration.
 //!
-//! Works on `ln theta` for positive parameters (a step is relative), on `theta` itself for signed ones.
-//! Used for the difficulty of a case (what the best baseline leaves), for the recalibration-only competitor and for the oracle.
+//! Works on `ln theta` for positive parameters (a step is relative), on `theta` itself for signed ones. A parameter that moves nothing (the
+//! drive's own friction where a bristle law stands in its place) stays where it is.
+//! Used for the difficulty of a case (what the best baseline leaves) and for the recalibration-only competitor; [`crate::oracle`] builds on it.
 
 use crate::input::Input;
 use crate::machine::Machine;
@@ -17,7 +18,7 @@ pub struct Target<'a> {
 
 /// What may be moved: plant parameters, effect parameters, and initial plant states.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Knob {
+pub(crate) enum Knob {
     Theta(usize),
     Effect(usize, usize),
     Initial(usize, f64),
@@ -32,8 +33,6 @@ pub struct Refit {
     pub rms: f64,
     /// Residual of each channel.
     pub residual: Vec<Vec<f64>>,
-    /// Names and standard errors of the effects' parameters (in their own unit), for unit residual variance scaled by `rms`.
-    pub errors: Vec<(usize, usize, f64)>,
 }
 
 /// What a refit moves.
@@ -45,6 +44,9 @@ pub enum Scope {
     Effects,
 }
 
+/// Relative step of the finite differences: small enough for a derivative, large against the integrator's tolerance.
+const STEP: f64 = 1e-4;
+
 /// Refits `start` to `target`; channel `c` is divided by `scale[c]`. `None` when the machine cannot be run at the start.
 pub fn refit(
     start: &Machine,
@@ -54,52 +56,86 @@ pub fn refit(
     free_initial: bool,
     rounds: usize,
 ) -> Option<Refit> {
-    let mut machine = start.clone();
-    let knobs = knobs(&machine, scope, free_initial, target);
-    let mut residual = residuals(&machine, target, scale)?;
-    let mut cost = square(&residual);
+    let knobs = knobs(start, scope, free_initial, target);
+    let first = Fit::of(start.clone(), target, scale)?;
+    Some(gauss_newton(first, &knobs, target, scale, STEP, rounds).refit())
+}
+
+/// A machine, its weighted residual and the sum of squares.
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    pub(crate) machine: Machine,
+    pub(crate) residual: Vec<Vec<f64>>,
+    pub(crate) cost: f64,
+}
+
+impl Fit {
+    /// The machine run on the target; `None` where it cannot be run.
+    pub(crate) fn of(machine: Machine, target: Target, scale: &[f64]) -> Option<Self> {
+        let residual = residuals(&machine, target, scale)?;
+        let cost = residual.iter().flatten().map(|v| v * v).sum();
+        Some(Self { machine, residual, cost })
+    }
+
+    /// Rms of the weighted residual.
+    pub(crate) fn rms(&self) -> f64 {
+        let samples: usize = self.residual.iter().map(Vec::len).sum();
+        (self.cost / samples.max(1) as f64).sqrt()
+    }
+
+    /// What is handed out.
+    pub(crate) fn refit(self) -> Refit {
+        Refit { rms: self.rms(), machine: self.machine, residual: self.residual }
+    }
+}
+
+/// Damped Gauss-Newton from a fit, derivatives by forward differences with this relative step.
+pub(crate) fn gauss_newton(
+    mut fit: Fit,
+    knobs: &[Knob],
+    target: Target,
+    scale: &[f64],
+    difference: f64,
+    rounds: usize,
+) -> Fit {
     let mut lambda = 1e-6;
-    let mut last_normal = Vec::new();
-    let n = knobs.len();
     for _ in 0..rounds {
-        let Some(jacobian) = jacobian(&machine, &knobs, target, scale, &residual) else { break };
-        let (normal, gradient) = normal_equations(&jacobian, &residual);
-        let mut improved = false;
+        let Some(jacobian) = jacobian(&fit, knobs, target, scale, difference) else { break };
+        let (normal, gradient) = normal_equations(&jacobian, &fit.residual);
         let mut fall = 0.0;
         for _ in 0..8 {
-            let Some(step) = solve(&normal, &gradient, n, lambda) else {
+            let Some(step) = solve(&normal, &gradient, knobs.len(), lambda) else {
                 lambda = (lambda * 10.0).max(1e-9);
                 continue;
             };
-            let mut trial = machine.clone();
-            for (knob, s) in knobs.iter().zip(&step) {
-                turn(&mut trial, *knob, s.clamp(-0.7, 0.7));
-            }
-            if let Some(r) = residuals(&trial, target, scale) {
-                let c = square(&r);
-                if c < cost {
-                    fall = 1.0 - c / cost;
-                    (machine, residual, cost) = (trial, r, c);
-                    lambda = (lambda * 0.1).max(1e-12);
-                    improved = true;
-                    break;
-                }
+            if let Some(trial) = Fit::of(moved(&fit.machine, knobs, &step, 0.7), target, scale)
+                && trial.cost < fit.cost
+            {
+                fall = 1.0 - trial.cost / fit.cost;
+                fit = trial;
+                lambda = (lambda * 0.1).max(1e-12);
+                break;
             }
             lambda = (lambda * 20.0).max(1e-9);
         }
-        last_normal = normal;
-        if !improved || fall < 1e-4 {
+        if fall < 1e-4 {
             break;
         }
     }
-    let samples: usize = residual.iter().map(Vec::len).sum();
-    let rms = (cost / samples.max(1) as f64).sqrt();
-    let errors = standard_errors(&machine, &knobs, &last_normal, rms);
-    Some(Refit { machine, rms, residual, errors })
+    fit
+}
+
+/// The machine with every knob turned by its step, `largest` at most.
+pub(crate) fn moved(machine: &Machine, knobs: &[Knob], step: &[f64], largest: f64) -> Machine {
+    let mut machine = machine.clone();
+    for (knob, s) in knobs.iter().zip(step) {
+        turn(&mut machine, *knob, s.clamp(-largest, largest));
+    }
+    machine
 }
 
 /// The knobs of the machine.
-fn knobs(machine: &Machine, scope: Scope, free_initial: bool, target: Target) -> Vec<Knob> {
+pub(crate) fn knobs(machine: &Machine, scope: Scope, free_initial: bool, target: Target) -> Vec<Knob> {
     let mut list: Vec<Knob> = (0..machine.theta.len()).map(Knob::Theta).collect();
     if scope == Scope::Effects {
         for (i, e) in machine.effects.iter().enumerate() {
@@ -185,31 +221,26 @@ fn residuals(machine: &Machine, target: Target, scale: &[f64]) -> Option<Vec<Vec
     Some(out)
 }
 
-fn square(residual: &[Vec<f64>]) -> f64 {
-    residual.iter().flatten().map(|v| v * v).sum()
-}
-
 /// Derivatives of the simulated output by forward differences.
-fn jacobian(
-    machine: &Machine,
+pub(crate) fn jacobian(
+    fit: &Fit,
     knobs: &[Knob],
     target: Target,
     scale: &[f64],
-    residual: &[Vec<f64>],
+    difference: f64,
 ) -> Option<Vec<Vec<f64>>> {
     knobs
         .iter()
         .map(|&knob| {
-            let step = 1e-4;
-            let mut moved = machine.clone();
-            turn(&mut moved, knob, step);
+            let mut moved = fit.machine.clone();
+            turn(&mut moved, knob, difference);
             let r = residuals(&moved, target, scale)?;
-            Some(r.iter().flatten().zip(residual.iter().flatten()).map(|(a, b)| (b - a) / step).collect())
+            Some(r.iter().flatten().zip(fit.residual.iter().flatten()).map(|(a, b)| (b - a) / difference).collect())
         })
         .collect()
 }
 
-fn normal_equations(jacobian: &[Vec<f64>], residual: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn normal_equations(jacobian: &[Vec<f64>], residual: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let n = jacobian.len();
     let flat: Vec<f64> = residual.iter().flatten().copied().collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
@@ -223,62 +254,86 @@ fn normal_equations(jacobian: &[Vec<f64>], residual: &[Vec<f64>]) -> (Vec<f64>, 
     (normal, jacobian.iter().map(|g| dot(g, &flat)).collect())
 }
 
-/// Solves `(A + lambda diag A) x = b` by Cholesky after equilibration; `None` when it is not positive definite.
+/// Solves `(A + lambda diag A) x = b` by Cholesky after equilibration; `None` when it is not positive definite. An unknown whose diagonal
+/// is zero has no bearing on the rest and comes out as zero.
 pub fn solve(a: &[f64], b: &[f64], n: usize, lambda: f64) -> Option<Vec<f64>> {
-    let d: Vec<f64> = (0..n).map(|i| a[i * n + i].sqrt().max(1e-300)).collect();
-    let mut l = vec![0.0; n * n];
-    for i in 0..n {
-        for j in 0..=i {
-            let mut sum = a[i * n + j] / (d[i] * d[j]);
-            if i == j {
-                sum += lambda + 1e-13;
-            }
-            for k in 0..j {
-                sum -= l[i * n + k] * l[j * n + k];
-            }
-            if i == j {
-                // The negated comparison also refuses NaN.
-                if !(sum > 1e-14 && sum.is_finite()) {
-                    return None;
-                }
-                l[i * n + i] = sum.sqrt();
-            } else {
-                l[i * n + j] = sum / l[j * n + j];
-            }
-        }
-    }
-    let mut x: Vec<f64> = (0..n).map(|i| b[i] / d[i]).collect();
-    for i in 0..n {
-        for k in 0..i {
-            x[i] -= l[i * n + k] * x[k];
-        }
-        x[i] /= l[i * n + i];
-    }
-    for i in (0..n).rev() {
-        for k in i + 1..n {
-            x[i] -= l[k * n + i] * x[k];
-        }
-        x[i] /= l[i * n + i];
-    }
-    let x: Vec<f64> = (0..n).map(|i| x[i] / d[i]).collect();
+    let factor = Factor::of(a, n, lambda)?;
+    let x = factor.back(factor.forth(b));
     x.iter().all(|v| v.is_finite()).then_some(x)
 }
 
-fn standard_errors(machine: &Machine, knobs: &[Knob], normal: &[f64], rms: f64) -> Vec<(usize, usize, f64)> {
-    let n = knobs.len();
-    if normal.len() != n * n {
-        return Vec::new();
-    }
-    let mut out = Vec::new();
-    for (i, knob) in knobs.iter().enumerate() {
-        if let Knob::Effect(effect, parameter) = *knob {
-            let mut unit = vec![0.0; n];
-            unit[i] = 1.0;
-            if let Some(column) = solve(normal, &unit, n, 0.0) {
-                let relative = rms * column[i].max(0.0).sqrt();
-                out.push((effect, parameter, relative * machine.effects[effect].p[parameter].abs()));
+/// `D^-1 (A + lambda diag A) D^-1 = L L^T` with `D = sqrt(diag A)`.
+pub(crate) struct Factor {
+    n: usize,
+    d: Vec<f64>,
+    l: Vec<f64>,
+}
+
+impl Factor {
+    pub(crate) fn of(a: &[f64], n: usize, lambda: f64) -> Option<Self> {
+        let inert = |i: usize| a[i * n + i] <= 0.0;
+        let d: Vec<f64> = (0..n).map(|i| if inert(i) { 1.0 } else { a[i * n + i].sqrt() }).collect();
+        let mut l = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..=i {
+                let mut sum = a[i * n + j] / (d[i] * d[j]);
+                if i == j {
+                    sum += if inert(i) { 1.0 } else { lambda + 1e-13 };
+                }
+                for k in 0..j {
+                    sum -= l[i * n + k] * l[j * n + k];
+                }
+                if i == j {
+                    // The negated comparison also refuses NaN.
+                    if !(sum > 1e-14 && sum.is_finite()) {
+                        return None;
+                    }
+                    l[i * n + i] = sum.sqrt();
+                } else {
+                    l[i * n + j] = sum / l[j * n + j];
+                }
             }
         }
+        Some(Self { n, d, l })
     }
-    out
+
+    /// `L^-1 D^-1 b`.
+    fn forth(&self, b: &[f64]) -> Vec<f64> {
+        let (n, l) = (self.n, &self.l);
+        let mut x: Vec<f64> = (0..n).map(|i| b[i] / self.d[i]).collect();
+        for i in 0..n {
+            for k in 0..i {
+                x[i] -= l[i * n + k] * x[k];
+            }
+            x[i] /= l[i * n + i];
+        }
+        x
+    }
+
+    /// `D^-1 L^-T x`: for a unit vector, a direction in which one step changes the sum of squares by one.
+    pub(crate) fn back(&self, mut x: Vec<f64>) -> Vec<f64> {
+        let (n, l) = (self.n, &self.l);
+        for i in (0..n).rev() {
+            for k in i + 1..n {
+                x[i] -= l[k * n + i] * x[k];
+            }
+            x[i] /= l[i * n + i];
+        }
+        (0..n).map(|i| x[i] / self.d[i]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_without_bearing_stays_and_the_others_are_solved_as_if_it_were_absent() {
+        let with = solve(&[4.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 3.0], &[1.0, 0.0, 2.0], 3, 0.0).unwrap();
+        let without = solve(&[4.0, 1.0, 1.0, 3.0], &[1.0, 2.0], 2, 0.0).unwrap();
+        assert_eq!(with[1], 0.0);
+        assert!((with[0] - without[0]).abs() < 1e-12 && (with[2] - without[1]).abs() < 1e-12);
+        // (1/11, 7/11) solves 4 x + y = 1, x + 3 y = 2.
+        assert!((without[0] - 1.0 / 11.0).abs() < 1e-12 && (without[1] - 7.0 / 11.0).abs() < 1e-12);
+    }
 }

@@ -6,6 +6,7 @@ use hysid_concealed::case::{Case, Group, Record};
 use hysid_concealed::design::{Source, suits};
 use hysid_concealed::law::Law;
 use hysid_concealed::machine::Machine;
+use hysid_concealed::oracle::oracle;
 use hysid_concealed::refit::{Scope, Target, refit};
 use hysid_concealed::seed::{Random, Stream};
 
@@ -19,7 +20,7 @@ use super::trial::{Bench, distance};
 pub struct Rivals {
     /// Baseline, recalibrated.
     pub before: f64,
-    /// The true structure, refitted.
+    /// The true structure, estimated from the same recording.
     pub oracle: f64,
     /// Linear black box (output-error model).
     pub linear: f64,
@@ -50,8 +51,10 @@ const LOOK: usize = 2000;
 /// Fits and runs the competitors.
 pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
     let baseline = case.design.baseline(&case.machine.effects);
-    let calibrated = fitted(case, &baseline, Scope::Plant);
-    let truth = fitted(case, &case.machine, Scope::Effects);
+    let recorded = Target { input: &case.est.input, y: &case.est.y };
+    let sigma = &case.label.sigma;
+    let calibrated = refit(&baseline, recorded, sigma, Scope::Plant, false, 12).map_or(baseline, |r| r.machine);
+    let truth = oracle(&case.machine, recorded, sigma).map_or_else(|| case.machine.clone(), |r| r.machine);
     let black = linear::fit(&case.est);
     let linear = |record: &Record| {
         black.as_ref().map_or(f64::INFINITY, |b| distance(&b.run(&record.input), &record.clean, &case.label.sigma))
@@ -67,11 +70,6 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
         narx_on_residual: if short { bench.narx_on_residual(case, &calibrated) } else { unknown },
         separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
     }
-}
-
-fn fitted(case: &Case, start: &Machine, scope: Scope) -> Machine {
-    let target = Target { input: &case.est.input, y: &case.est.y };
-    refit(start, target, &case.label.sigma, scope, false, 12).map_or_else(|| start.clone(), |r| r.machine)
 }
 
 /// Free-run error of a machine on a record.
