@@ -5,7 +5,7 @@ use hysid_plant::Simulation;
 use crate::data::DataSet;
 use crate::evidence::{Projector, Whitener, norm2};
 use crate::model::{Model, Values};
-use crate::refit::{Fit, LmOptions, Problem, levenberg_marquardt};
+use crate::refit::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};
 
 /// Largest order of the noise models.
 pub const MAX_AR: usize = 16;
@@ -43,28 +43,42 @@ pub struct Base<'d> {
     pub log_likelihood: f64,
 }
 
-/// Fits a simulation from these values: alternately the unknowns under the noise model and the noise model on the residual.
+/// Where a fit begins.
+#[derive(Debug, Clone, Copy)]
+pub enum Start<'a> {
+    /// At these values.
+    Values(&'a Values),
+    /// Where a fit of the same simulation ended.
+    Fit(&'a Fit),
+}
+
+/// Fits a simulation: alternately the unknowns under the noise model and the noise model on the residual.
 ///
 /// The first round uses `whitener`, or white noise where there is none. `None` where the simulation diverges at the start.
 pub fn fit_simulation<'d>(
     model: Model<'d>,
-    start: &Values,
+    start: Start<'_>,
     whitener: Option<&Whitener>,
     rounds: usize,
     options: LmOptions,
     kind: NoiseKind,
 ) -> Option<Base<'d>> {
     let data = model.data();
-    let mut theta = model.theta(start);
     let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
     let mut noise = match whitener {
         Some(w) if kind == NoiseKind::Coloured || w.order() == 0 => w.clone(),
         _ => data.layout.fit_noise(&data.y, 0),
     };
-    let mut fit = None;
+    let mut fit: Option<Fit> = None;
     for _ in 0..rounds.max(1) {
-        let f = levenberg_marquardt(&model, &theta, &data.layout, &noise, None, options)?;
-        theta.clone_from(&f.theta);
+        let f = match (&fit, start) {
+            (Some(before), _) | (None, Start::Fit(before)) => {
+                go_on(&model, before, &data.layout, &noise, None, options)?
+            }
+            (None, Start::Values(values)) => {
+                levenberg_marquardt(&model, &model.theta(values), &data.layout, &noise, None, options)?
+            }
+        };
         noise = data.layout.fit_noise(&f.residual, order);
         fit = Some(f);
     }

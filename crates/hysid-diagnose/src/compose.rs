@@ -6,7 +6,7 @@ use crate::fitting::{HOPELESS, Part, assemble, complete, refit_all, without};
 use crate::hypothesis::{Effect, Hypothesis, Key, Setting};
 use crate::joint::pairs;
 use crate::mechanism::Mechanism;
-use crate::screen::{Candidate, screen};
+use crate::screen::Candidate;
 
 /// The candidates worth a refit: the best by score, at most `most`, and one for each slot and family that is not far behind.
 pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
@@ -83,6 +83,16 @@ pub struct SearchOptions {
     pub most: usize,
 }
 
+/// What composition asks of the search that it is a part of.
+pub struct Ask<'a, 'd> {
+    /// Whether something significant is left of a hypothesis' residual.
+    pub unexplained: &'a dyn Fn(&Hypothesis<'d>) -> bool,
+    /// What could be missing around a hypothesis.
+    pub around: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
+    /// Whether time is up.
+    pub enough: &'a dyn Fn() -> bool,
+}
+
 /// Log evidence that another effect must add.
 pub const LEAST_GAIN: f64 = 4.0;
 
@@ -117,17 +127,16 @@ pub fn superposed<'d>(
 
 /// Extends the hypotheses of `pool` (all of one effect or more) until evidence stops growing, prunes the best and tries swaps.
 ///
-/// `candidates` are those of the simulation without effects. `unexplained` says whether something significant is left of a hypothesis'
-/// residual, `enough` whether time is up. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
+/// `candidates` are those of the simulation without effects. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
 pub fn compose<'d>(
     setting: &Setting<'d>,
     none: &Hypothesis<'d>,
     candidates: &[Candidate],
     pool: &mut Vec<Hypothesis<'d>>,
     options: SearchOptions,
-    unexplained: &dyn Fn(&Hypothesis<'d>) -> bool,
-    enough: &dyn Fn() -> bool,
+    ask: &Ask<'_, 'd>,
 ) {
+    let Ask { unexplained, around, enough } = ask;
     for depth in 2..=options.depth {
         if enough() {
             return;
@@ -146,7 +155,7 @@ pub fn compose<'d>(
             if enough() {
                 break;
             }
-            found.extend(extended(setting, &pool[p], options, None));
+            found.extend(extended(setting, &pool[p], &around(&pool[p]), options, None));
         }
         let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
         for h in found {
@@ -170,7 +179,7 @@ pub fn compose<'d>(
                 break;
             }
             let Some(rest) = without(setting, none, &pool[best], index) else { continue };
-            found.extend(extended(setting, &rest, options, Some(&pool[best].effects[index])));
+            found.extend(extended(setting, &rest, &around(&rest), options, Some(&pool[best].effects[index])));
             found.push(rest);
         }
         for h in found {
@@ -186,15 +195,15 @@ pub fn compose<'d>(
 fn extended<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'d>,
+    candidates: &[Candidate],
     options: SearchOptions,
     dropped: Option<&Effect>,
 ) -> Vec<Hypothesis<'d>> {
-    let candidates = screen(&parent.base, &setting.original, &parent.effects, &parent.base.evidence(), &|_, _| true);
     if candidates.first().is_none_or(|c| c.score() < 2.0) {
         return Vec::new();
     }
-    let mut list = short_list(&candidates, options.most);
-    for rival in dropped.map_or_else(Vec::new, |d| rivals_of(d, &candidates)) {
+    let mut list = short_list(candidates, options.most);
+    for rival in dropped.map_or_else(Vec::new, |d| rivals_of(d, candidates)) {
         include(&mut list, rival);
     }
     refit_all(setting, parent, &list)

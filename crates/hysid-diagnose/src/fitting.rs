@@ -114,22 +114,21 @@ fn refit_from<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'_>,
     candidate: &Candidate,
-    mut froms: Vec<Values>,
+    froms: Vec<Values>,
     begun: Option<Base<'d>>,
 ) -> Option<Hypothesis<'d>> {
     let document = &candidate.refit.simulation;
-    if let (Some(b), Some(first)) = (&begun, froms.first_mut()) {
-        *first = b.values();
-    }
     let mut best: Option<Base<'d>> = begun;
     for (i, from) in froms.into_iter().enumerate() {
         // Another start must come near the best in a few iterations to be followed.
         let brief = if i == 0 { setting.iterations } else { 5 };
-        let Some(mut base) = setting.fit(document, &from, Some(&parent.base.whitener), 1, brief) else {
-            continue;
+        let fitted = match &best {
+            Some(begun) if i == 0 => setting.further(begun, Some(&parent.base.whitener), 1, brief),
+            _ => setting.fit(document, &from, Some(&parent.base.whitener), 1, brief),
         };
+        let Some(mut base) = fitted else { continue };
         if i > 0 && best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood - 10.0) {
-            let longer = setting.fit(document, &base.values(), Some(&parent.base.whitener), 1, setting.iterations);
+            let longer = setting.further(&base, Some(&parent.base.whitener), 1, setting.iterations);
             base = longer.unwrap_or(base);
         }
         if best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood) {
@@ -146,8 +145,7 @@ fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
     for index in from..h.effects.len() {
         profile_shapes(setting, h, index);
     }
-    let document = h.base.model.simulation();
-    let polished = setting.fit(document, &h.base.values(), Some(&h.base.whitener), 1, setting.iterations);
+    let polished = setting.further(&h.base, Some(&h.base.whitener), 1, setting.iterations);
     if let Some(p) = polished
         && p.log_likelihood > h.base.log_likelihood
     {
@@ -336,8 +334,7 @@ pub fn assemble<'d>(
 
 /// Goes on with a hypothesis that was fitted for a few iterations only.
 pub fn complete<'d>(setting: &Setting<'d>, mut h: Hypothesis<'d>) -> Hypothesis<'d> {
-    let document = h.base.model.simulation();
-    if let Some(base) = setting.fit(document, &h.base.values(), Some(&h.base.whitener), 2, setting.iterations)
+    if let Some(base) = setting.further(&h.base, Some(&h.base.whitener), 2, setting.iterations)
         && base.log_likelihood > h.base.log_likelihood
     {
         h.base = base;

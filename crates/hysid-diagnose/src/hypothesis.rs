@@ -5,12 +5,12 @@
 
 use hysid_plant::Simulation;
 
-use crate::base::{Base, NoiseKind, fit_simulation};
+use crate::base::{Base, NoiseKind, Start, fit_simulation};
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Rewritten};
 use crate::model::{Model, Values};
-use crate::refit::{LmOptions, levenberg_marquardt};
+use crate::refit::{LmOptions, go_on};
 use crate::slot::Slot;
 
 /// An effect of a hypothesis.
@@ -55,8 +55,7 @@ pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Ve
     let data = setting.data;
     let weights = held_out_blocks(&data.layout, &data.y);
     let options = LmOptions { iterations: 5, ..LmOptions::default() };
-    let fit =
-        levenberg_marquardt(&h.base.model, &h.base.fit.theta, &data.layout, &h.base.whitener, Some(&weights), options)?;
+    let fit = go_on(&h.base.model, &h.base.fit, &data.layout, &h.base.whitener, Some(&weights), options)?;
     let white = h.base.whitener.apply(&data.layout, &fit.residual);
     let (mut score, mut squares) = (0.0, Vec::new());
     for s in &data.layout.series {
@@ -99,7 +98,21 @@ impl<'d> Setting<'d> {
         iterations: usize,
     ) -> Option<Base<'d>> {
         let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
-        fit_simulation(model, start, noise, rounds, LmOptions { iterations, ..LmOptions::default() }, self.noise)
+        let options = LmOptions { iterations, ..LmOptions::default() };
+        fit_simulation(model, Start::Values(start), noise, rounds, options, self.noise)
+    }
+
+    /// Goes on with a fitted document; the noise model is that given, then its own.
+    pub fn further(
+        &self,
+        base: &Base<'_>,
+        noise: Option<&Whitener>,
+        rounds: usize,
+        iterations: usize,
+    ) -> Option<Base<'d>> {
+        let model = Model::new(base.model.simulation(), self.data, &self.own_states, self.substeps).ok()?;
+        let options = LmOptions { iterations, ..LmOptions::default() };
+        fit_simulation(model, Start::Fit(&base.fit), noise, rounds, options, self.noise)
     }
 
     /// A fitted document as a hypothesis.

@@ -65,6 +65,8 @@ pub struct Hooks<'a> {
     pub progress: &'a (dyn Fn(&str) + Sync),
     /// Whether this share of the time is up: optional steps are then left out.
     pub expired: &'a (dyn Fn(f64) -> bool + Sync),
+    /// Told once, when the input is known to be good: work of the caller's own can go on beside the search from here.
+    pub accepted: &'a (dyn Fn() + Sync),
 }
 
 /// The outcome of a diagnosis.
@@ -135,6 +137,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         noise: NoiseKind::Coloured,
     };
     let base = calibrate(&mut setting, request)?;
+    (hooks.accepted)();
     setting.own_unknowns = base.model.unknowns().len();
     let none = setting.hypothesis(Vec::new(), base);
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::base::Base;
-use crate::compose::{SearchOptions, add, compose, short_list, unheard};
+use crate::compose::{Ask, SearchOptions, add, compose, short_list, unheard};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all};
@@ -51,7 +51,7 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
     };
     let rms = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual).sqrt();
     // Under its own noise, twice.
-    let polished = setting.fit(simulation, &best.values(), Some(&best.whitener), 2, 20);
+    let polished = setting.further(&best, Some(&best.whitener), 2, 20);
     Ok(match polished {
         // Noise of any colour may not explain what the simulation can.
         Some(p) if p.log_likelihood > best.log_likelihood && rms(&p) < WORSE * rms(&best) => p,
@@ -81,6 +81,8 @@ pub struct Search<'a, 'd> {
     pub hooks: &'a Hooks<'a>,
     /// Tests of what remains, by statement: composition and the verdict ask for the same ones.
     tests: RefCell<BTreeMap<Key, SurrogateTest>>,
+    /// What could be missing around the hypothesis that was tested last: composition mostly extends that one next.
+    screened: RefCell<Option<(Key, Vec<Candidate>)>>,
     /// Generic terms for the simulation without effects: the second look, the verdict and the correction ask for the same ones.
     open: OnceCell<Option<OpenSet>>,
 }
@@ -88,12 +90,12 @@ pub struct Search<'a, 'd> {
 impl<'a, 'd> Search<'a, 'd> {
     /// A search that has found nothing yet.
     pub fn new(setting: &'a Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
-        Self { setting, options, hooks, tests: RefCell::default(), open: OnceCell::new() }
+        Self { setting, options, hooks, tests: RefCell::default(), screened: RefCell::default(), open: OnceCell::new() }
     }
 
     /// The simulation without effects under this search's noise model, and what could be missing in it.
     pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
-        let base = self.setting.fit(&self.setting.original, &none.base.values(), None, 2, 25)?;
+        let base = self.setting.further(&none.base, None, 2, 25)?;
         let start = self.setting.hypothesis(Vec::new(), base);
         let candidates = screen(&start.base, &self.setting.original, &[], &start.base.evidence(), &|_, _| true);
         Some((start, candidates))
@@ -128,7 +130,10 @@ impl<'a, 'd> Search<'a, 'd> {
         };
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
         let enough = || (self.hooks.expired)(COMPOSING);
-        compose(self.setting, none, candidates, pool, bounds, &unexplained, &enough);
+        let around = |h: &Hypothesis<'d>| self.around(h);
+        let hear = Ask { unexplained: &unexplained, around: &around, enough: &enough };
+        compose(self.setting, none, candidates, pool, bounds, &hear);
+        self.screened.take();
     }
 
     /// The likeliest of these sets, which were found under another noise model, fitted under this search's.
@@ -139,8 +144,7 @@ impl<'a, 'd> Search<'a, 'd> {
             .into_par_iter()
             .take(MOST_CARRIED)
             .filter_map(|h| {
-                let document = h.base.model.simulation();
-                let base = self.setting.fit(document, &h.base.values(), None, 3, self.setting.iterations)?;
+                let base = self.setting.further(&h.base, None, 3, self.setting.iterations)?;
                 (base.log_likelihood > none.base.log_likelihood)
                     .then(|| self.setting.hypothesis(h.effects.clone(), base))
             })
@@ -175,17 +179,24 @@ impl<'a, 'd> Search<'a, 'd> {
 
     /// The test of what remains of a hypothesis' residual.
     pub fn remains(&self, h: &Hypothesis<'_>) -> SurrogateTest {
-        let mut key = h.key();
-        // A better fit of the same statement is tested anew.
-        key.push(("", format!("{:.3}", h.log_evidence)));
+        let key = fitted_key(h);
         if let Some(known) = self.tests.borrow().get(&key) {
             return known.clone();
         }
         let evidence = h.base.evidence();
         let rest = screen(&h.base, &self.setting.original, &h.effects, &evidence, &|_, _| true);
         let test = self.test(&rest, &h.base, &evidence);
-        self.tests.borrow_mut().insert(key, test.clone());
+        self.tests.borrow_mut().insert(key.clone(), test.clone());
+        *self.screened.borrow_mut() = Some((key, rest));
         test
+    }
+
+    /// What could be missing around a hypothesis.
+    fn around(&self, h: &Hypothesis<'_>) -> Vec<Candidate> {
+        match self.screened.borrow_mut().take() {
+            Some((key, found)) if key == fitted_key(h) => found,
+            _ => screen(&h.base, &self.setting.original, &h.effects, &h.base.evidence(), &|_, _| true),
+        }
     }
 
     /// The mismatch test over all candidates' kept columns.
@@ -195,6 +206,13 @@ impl<'a, 'd> Search<'a, 'd> {
         let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed };
         surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, options)
     }
+}
+
+/// The statement of a hypothesis with its evidence: a better fit of the same statement is looked at anew.
+fn fitted_key(h: &Hypothesis<'_>) -> Key {
+    let mut key = h.key();
+    key.push(("", format!("{:.3}", h.log_evidence)));
+    key
 }
 
 /// A question as it was typed.

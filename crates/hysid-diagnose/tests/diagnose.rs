@@ -21,7 +21,7 @@ fn recording(name: &str, seed: u64, n: usize, force: impl Fn(f64, f64) -> f64) -
 
 fn run(text: &str, estimation: &[Recording], holdout: &[Recording]) -> Result<Diagnosis, DiagnoseError> {
     let simulation = Simulation::parse(text, "test.sim.toml").unwrap();
-    let hooks = Hooks { progress: &|_| {}, expired: &|_| false };
+    let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
     let request = Request {
         simulation: &simulation,
         file: "test.sim.toml",

@@ -19,6 +19,8 @@ pub struct Bank {
     pub(crate) y_sign: Vec<f64>,
     /// Each quantity of an input, sample by sample; 0 outside the gap-free stretches.
     columns: HashMap<Quantity, Vec<f64>>,
+    /// The derived inputs that the columns hold.
+    derived: Vec<Derived>,
     /// The gap-free stretches.
     pub(crate) stretches: Vec<Range<usize>>,
 }
@@ -41,7 +43,8 @@ impl Bank {
             return Err(bad(format!("an input has {} samples, the output {length}", u.len())));
         }
         let stretches = record.gap_free();
-        let mut bank = Self { y: record.y.to_vec(), y_sign: Vec::new(), columns: HashMap::new(), stretches };
+        let mut bank =
+            Self { y: record.y.to_vec(), y_sign: Vec::new(), columns: HashMap::new(), derived: Vec::new(), stretches };
         for (i, u) in record.inputs.iter().enumerate() {
             bank.set_input(i, u, signals);
         }
@@ -51,10 +54,17 @@ impl Bank {
         Ok(bank)
     }
 
-    /// Computes the derived inputs anew, as when their parameters have changed.
+    /// Brings the derived inputs to these: those that have changed, or whose source has, are computed anew.
     pub(crate) fn set_derived(&mut self, derived: &[Derived], signals: &Signals) {
         let recorded = signals.inputs().len().saturating_sub(derived.len());
+        let before = std::mem::replace(&mut self.derived, derived.to_vec());
+        let mut changed = vec![false; derived.len()];
         for (i, d) in derived.iter().enumerate() {
+            let source = d.source.checked_sub(recorded).is_some_and(|s| changed.get(s).copied().unwrap_or(true));
+            changed[i] = source || before.get(i) != Some(d);
+            if !changed[i] {
+                continue;
+            }
             let mut out = vec![0.0; self.y.len()];
             if let Some(source) = self.columns.get(&Quantity::Value(Signal::Input(d.source))) {
                 for s in &self.stretches {

@@ -146,18 +146,19 @@ impl Trainer {
 
 /// Forward selection on stored rows: the first `present` columns are in, the rest compete for the residual.
 fn forward(rows: &[f64], residual: &[f64], width: usize, present: usize, count: usize) -> Vec<Gain> {
-    // Inner products of every column with column j.
-    let products = |j: usize| {
-        let mut g = vec![0.0; width];
+    // Inner products of every column with some of them, in one pass over the rows.
+    let products = |columns: std::ops::Range<usize>| {
+        let mut all = vec![vec![0.0; width]; columns.len()];
         for row in rows.chunks_exact(width) {
-            let r = row[j];
-            if r != 0.0 {
-                for (g, x) in g.iter_mut().zip(row) {
-                    *g += r * x;
+            for (g, &r) in all.iter_mut().zip(&row[columns.clone()]) {
+                if r != 0.0 {
+                    for (g, x) in g.iter_mut().zip(row) {
+                        *g += r * x;
+                    }
                 }
             }
         }
-        g
+        all
     };
     let mut norm = vec![0.0; width];
     let mut right = vec![0.0; width];
@@ -172,12 +173,12 @@ fn forward(rows: &[f64], residual: &[f64], width: usize, present: usize, count: 
     // Rows of the triangular factor of the columns taken so far.
     let mut taken: Vec<Vec<f64>> = Vec::new();
     let mut out = vec![false; width];
-    let mut take = |j: usize, norm: &mut [f64], right: &mut [f64], out: &mut [bool]| {
+    let mut take = |j: usize, known: Option<Vec<f64>>, norm: &mut [f64], right: &mut [f64], out: &mut [bool]| {
         out[j] = true;
         if !(norm[j] > COLLINEAR * whole[j]) {
             return;
         }
-        let mut row = products(j);
+        let Some(mut row) = known.or_else(|| products(j..j + 1).pop()) else { return };
         for t in &taken {
             let f = t[j];
             for (r, t) in row.iter_mut().zip(t) {
@@ -193,8 +194,8 @@ fn forward(rows: &[f64], residual: &[f64], width: usize, present: usize, count: 
         }
         taken.push(row);
     };
-    for j in 0..present {
-        take(j, &mut norm, &mut right, &mut out);
+    for (j, known) in products(0..present).into_iter().enumerate() {
+        take(j, Some(known), &mut norm, &mut right, &mut out);
     }
     let mut gains = Vec::new();
     for _ in 0..count {
@@ -210,7 +211,7 @@ fn forward(rows: &[f64], residual: &[f64], width: usize, present: usize, count: 
         }
         let Some((j, gain)) = best.filter(|(_, g)| *g > 0.0) else { break };
         gains.push(Gain { candidate: j - present, share: gain / total.max(f64::MIN_POSITIVE) });
-        take(j, &mut norm, &mut right, &mut out);
+        take(j, None, &mut norm, &mut right, &mut out);
     }
     gains
 }

@@ -142,6 +142,8 @@ pub(crate) fn sensitivities(
     // The last `lags` rows, as a ring.
     let mut ring = vec![0.0; lags.max(1) * width];
     let mut row = vec![0.0; width];
+    // Mostly a model's own columns are asked for, along its own run: the factors' values are the same then.
+    let same = std::ptr::eq(model, columns) && std::ptr::eq(along, driven);
     for i in rules.given..window.len() {
         let n = window.start + i;
         columns.factor_values(n, i, &driven.y, &driven.sign, &column_inputs, &mut w);
@@ -149,9 +151,11 @@ pub(crate) fn sensitivities(
             *r = columns.term(k, &w);
         }
         if lags > 0 {
-            model.factor_values(n, i, &along.y, &along.sign, &model_inputs, &mut v);
+            if !same {
+                model.factor_values(n, i, &along.y, &along.sign, &model_inputs, &mut v);
+            }
             jacobian.fill(0.0);
-            model.output_jacobian(theta, &v, &mut jacobian);
+            model.output_jacobian(theta, if same { &w } else { &v }, &mut jacobian);
             for l in 1..=lags.min(i - rules.given) {
                 let j = jacobian[l];
                 if j != 0.0 {

@@ -11,6 +11,8 @@
 //!
 //! The features must come from *simulated* trajectories: measured ones carry the noise of the residual into the feature.
 
+use std::ops::Range;
+
 use hysid_signal::{fourier, inverse_fourier};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
@@ -55,14 +57,19 @@ pub fn correlation_time(layout: &Layout, r: &[f64]) -> usize {
     (1..limit).find(|&k| (x[k..].iter().zip(x).map(|(a, b)| a * b).sum::<f64>() / power).abs() < 0.1).unwrap_or(limit)
 }
 
-/// The largest score over the groups, with the group.
-fn largest(groups: &[&FeatureGroup], r: &[f64], own: &Projector) -> (f64, Option<usize>) {
-    let total = norm2(r) - own.inside(r);
-    let mut best = (f64::NEG_INFINITY, None);
+/// Surrogates that are scored together: the groups' columns are far more than a cache holds, and each is read once for all of them.
+const TOGETHER: usize = 8;
+
+/// The largest score over the groups, with the group, of each of these residuals.
+fn largest(groups: &[&FeatureGroup], residuals: &[Vec<f64>], own: &Projector) -> Vec<(f64, Option<usize>)> {
+    let mut best: Vec<(f64, Option<usize>)> = vec![(f64::NEG_INFINITY, None); residuals.len()];
+    let totals: Vec<f64> = residuals.iter().map(|r| norm2(r) - own.inside(r)).collect();
     for (i, g) in groups.iter().enumerate() {
-        let s = score(total, g.explained(r), r.len(), g.columns.len());
-        if s > best.0 {
-            best = (s, Some(i));
+        for ((r, total), best) in residuals.iter().zip(&totals).zip(&mut best) {
+            let s = score(*total, g.explained(r), r.len(), g.columns.len());
+            if s > best.0 {
+                *best = (s, Some(i));
+            }
         }
     }
     best
@@ -140,22 +147,28 @@ pub fn surrogate_test(
     r: &[f64],
     options: TestOptions,
 ) -> SurrogateTest {
-    let (statistic, best) = largest(groups, r, own);
+    let (statistic, best) =
+        largest(groups, &[r.to_vec()], own).pop().unwrap_or((f64::NEG_INFINITY, None));
     if groups.is_empty() {
         return SurrogateTest { p_value: 1.0, statistic: 0.0, best: None, surrogates: Vec::new() };
     }
     let tau = correlation_time(layout, r);
-    let score_of = |x: &[f64]| largest(groups, x, own).0;
-    let rolled = |b: u64| score_of(&surrogate(layout, r, tau, options.seed, b));
+    let scores_of = |some: &[Vec<f64>]| largest(groups, some, own).into_iter().map(|l| l.0).collect();
+    let rolled = |some: Range<u64>| -> Vec<f64> {
+        scores_of(&some.map(|b| surrogate(layout, r, tau, options.seed, b)).collect::<Vec<_>>())
+    };
     let bar = statistic - MARGIN;
     let mut surrogates = draw(&rolled, bar, options.alpha);
     let mut p_value = exceeded(&surrogates, bar);
     if p_value < options.alpha {
         let levels: Vec<Vec<f64>> = layout.series.iter().map(|s| levels(&r[s.rows.clone()])).collect();
-        let gaussian = |b: u64| {
-            let mut x = drawn(layout, &levels, r.len(), options.seed, b);
-            own.remove(&mut x);
-            score_of(&x)
+        let gaussian = |some: Range<u64>| -> Vec<f64> {
+            let one = |b| {
+                let mut x = drawn(layout, &levels, r.len(), options.seed, b);
+                own.remove(&mut x);
+                x
+            };
+            scores_of(&some.map(one).collect::<Vec<_>>())
         };
         let other = draw(&gaussian, bar, options.alpha);
         let p = exceeded(&other, bar);
@@ -176,7 +189,7 @@ fn exceeded(scores: &[f64], statistic: f64) -> f64 {
 }
 
 /// Scores of surrogates, in batches until the answer is clear.
-fn draw(one: &(dyn Fn(u64) -> f64 + Sync), statistic: f64, alpha: f64) -> Vec<f64> {
+fn draw(some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync), statistic: f64, alpha: f64) -> Vec<f64> {
     let alpha = alpha.clamp(1e-5, 0.5);
     let first = ((1.0 / alpha).ceil() as usize).max(200) - 1;
     let most = ((4.0 / alpha).ceil() as usize).max(1000) - 1;
@@ -184,7 +197,10 @@ fn draw(one: &(dyn Fn(u64) -> f64 + Sync), statistic: f64, alpha: f64) -> Vec<f6
     while scores.len() < most {
         let start = scores.len();
         let end = if start == 0 { first } else { (start + 200).min(most) };
-        scores.extend((start..end).into_par_iter().map(|b| one(b as u64)).collect::<Vec<f64>>());
+        let blocks: Vec<usize> = (start..end).step_by(TOGETHER).collect();
+        let drawn: Vec<Vec<f64>> =
+            blocks.into_par_iter().map(|b| some(b as u64..(b + TOGETHER).min(end) as u64)).collect();
+        scores.extend(drawn.concat());
         let exceeding = scores.iter().filter(|&&v| v >= statistic).count();
         let highest = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if exceeding >= 20 || (exceeding == 0 && statistic > highest + 6.0 && 1.0 / (1 + scores.len()) as f64 <= alpha)

@@ -72,9 +72,37 @@ pub fn levenberg_marquardt(
     weights: Option<&[f64]>,
     options: LmOptions,
 ) -> Option<Fit> {
+    let theta: Vec<f64> = start.iter().zip(problem.bounds()).map(|(x, b)| x.clamp(b.0, b.1)).collect();
+    let first = problem.tangent(&theta)?;
+    descend(problem, theta, first, layout, whitener, weights, options)
+}
+
+/// Goes on where a fit of the same problem ended, under another noise model, other weights or for longer: what was found of the
+/// starting point is known already.
+pub fn go_on(
+    problem: &dyn Problem,
+    fit: &Fit,
+    layout: &Layout,
+    whitener: &Whitener,
+    weights: Option<&[f64]>,
+    options: LmOptions,
+) -> Option<Fit> {
+    let first = (fit.residual.clone(), fit.jacobian.clone());
+    descend(problem, fit.theta.clone(), first, layout, whitener, weights, options)
+}
+
+/// The fit from a point with its residual and tangents.
+fn descend(
+    problem: &dyn Problem,
+    mut theta: Vec<f64>,
+    (mut residual, mut jacobian): (Vec<f64>, Vec<Vec<f64>>),
+    layout: &Layout,
+    whitener: &Whitener,
+    weights: Option<&[f64]>,
+    options: LmOptions,
+) -> Option<Fit> {
     let bounds = problem.bounds();
     let clamp = |i: usize, x: f64| x.clamp(bounds[i].0, bounds[i].1);
-    let mut theta: Vec<f64> = start.iter().enumerate().map(|(i, &x)| clamp(i, x)).collect();
     let k = theta.len();
     let whiten = |stack: &[f64]| {
         let mut w = whitener.apply(layout, stack);
@@ -85,7 +113,6 @@ pub fn levenberg_marquardt(
         let c = norm2(&whiten(residual));
         if c.is_finite() { c } else { f64::INFINITY }
     };
-    let (mut residual, mut jacobian) = problem.tangent(&theta)?;
     let mut white = whiten(&residual);
     let mut cost = norm2(&white);
     if !cost.is_finite() {
@@ -134,7 +161,7 @@ pub fn levenberg_marquardt(
         let rhs = DVector::from_iterator(m, free.iter().map(|&i| gradient[i] / scale[i]));
         // Inner loop: raise the damping until a step lowers the cost.
         let mut accepted = false;
-        for _ in 0..12 {
+        for tries in 0..12 {
             let mut damped = gram.clone();
             for a in 0..m {
                 damped[(a, a)] += mu * gram[(a, a)].max(1e-8) + 1e-13;
@@ -157,11 +184,18 @@ pub fn levenberg_marquardt(
             }
             let d = DVector::from_column_slice(&change);
             let predicted = 2.0 * d.dot(&rhs) - (gram.clone() * &d).dot(&d);
-            let trial_cost = problem.residual(&trial).map_or(f64::INFINITY, |r| cost_of(&r));
+            // The first step is accepted in nine cases of ten: tangents are needed then, and a run without them would be for nothing.
+            let first = tries == 0;
+            let mut ahead = if first { problem.tangent(&trial) } else { None };
+            let trial_cost = match &ahead {
+                Some((r, _)) => cost_of(r),
+                None if first => f64::INFINITY,
+                None => problem.residual(&trial).map_or(f64::INFINITY, |r| cost_of(&r)),
+            };
             let gain = (cost - trial_cost) / predicted.max(1e-300);
             if trial_cost < cost && gain > 1e-4 {
                 let drop = (cost - trial_cost) / cost.max(1e-300);
-                let Some((r, j)) = problem.tangent(&trial) else {
+                let Some((r, j)) = ahead.take().or_else(|| problem.tangent(&trial)) else {
                     mu *= nu;
                     nu *= 2.0;
                     continue;
@@ -297,6 +331,25 @@ mod tests {
             let f = fit(start, vec![(-100.0, 100.0), (-10.0, 10.0)]);
             assert!((f.theta[0] - 3.0).abs() < 1e-5 && (f.theta[1] - 0.7).abs() < 1e-5, "{:?}", f.theta);
             assert!(f.converged);
+        }
+    }
+
+    #[test]
+    fn a_fit_that_goes_on_is_the_fit_from_its_end() {
+        let n = 50;
+        let bounds = vec![(-100.0, 100.0), (-10.0, 10.0)];
+        let problem = Decay { y: (0..n).map(|i| 3.0 * (-0.7 * i as f64 * 0.1).exp()).collect(), bounds };
+        let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
+        let whitener = Whitener { models: vec![NoiseModel::white(0.1)] };
+        let weights: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i % 3 > 0))).collect();
+        for iterations in [0, 2, 30] {
+            let options = LmOptions { iterations, ..LmOptions::default() };
+            let begun = levenberg_marquardt(&problem, &[20.0, 5.0], &layout, &whitener, None, options).unwrap();
+            let longer = LmOptions::default();
+            let from_its_end =
+                levenberg_marquardt(&problem, &begun.theta, &layout, &whitener, Some(&weights), longer).unwrap();
+            let further = go_on(&problem, &begun, &layout, &whitener, Some(&weights), longer).unwrap();
+            assert_eq!((further.theta, further.residual), (from_its_end.theta, from_its_end.residual));
         }
     }
 

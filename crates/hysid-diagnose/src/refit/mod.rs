@@ -2,4 +2,4 @@
 
 mod lm;
 
-pub use lm::{Fit, LmOptions, Problem, levenberg_marquardt};
+pub use lm::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};

@@ -22,25 +22,56 @@ const MOST_SAMPLES: usize = 30_000;
 /// Samples of a window that is worth it.
 const SHORTEST: usize = 100;
 
-/// Fills `rmse_black_box` of the hold-out's entries; a note says why it is missing.
-pub fn score(file: &mut DiagnosisFile, picture: &Picture, simulation: &Simulation, intake: &Intake, seed: u64) {
+/// A model for each output of the simulation, or why there is none.
+pub type Models = Vec<Result<NarxModel, String>>;
+
+/// The models where they learn from whole recordings, so that the diagnosis need not be waited for; `None` where it decides on the samples.
+pub fn early(simulation: &Simulation, intake: &Intake, seed: u64) -> Option<impl FnOnce() -> Models + Send> {
+    let whole = !intake.holdout.is_empty() && samples(intake) <= MOST_SAMPLES;
+    whole.then_some(move || models(&intake.estimation, &intake.holdout, simulation, seed))
+}
+
+/// The models, learnt from the samples that the diagnosis did not hold out.
+pub fn late(picture: &Picture, simulation: &Simulation, intake: &Intake, seed: u64) -> Models {
     let held: Vec<&RecordPicture> = picture.records.iter().filter(|r| r.role == Role::HoldOut).collect();
     let blocks = intake.holdout.is_empty();
-    let holdout = if blocks { &intake.estimation } else { &intake.holdout };
-    let samples: usize = intake.estimation.iter().map(Recording::len).sum();
-    let estimation = if samples > MOST_SAMPLES {
-        windows(&intake.estimation, picture)
+    let estimation = if samples(intake) > MOST_SAMPLES {
+        &windows(&intake.estimation, picture)
     } else if blocks {
-        without_blocks(&intake.estimation, &held, simulation)
+        &without_blocks(&intake.estimation, &held, simulation)
     } else {
-        intake.estimation.clone()
+        &intake.estimation
     };
+    models(estimation, if blocks { &intake.estimation } else { &intake.holdout }, simulation, seed)
+}
+
+fn samples(intake: &Intake) -> usize {
+    intake.estimation.iter().map(Recording::len).sum()
+}
+
+fn models(estimation: &[Recording], holdout: &[Recording], simulation: &Simulation, seed: u64) -> Models {
     // Two symbols may stand for one column.
     let columns: BTreeSet<&String> = simulation.inputs.iter().map(|i| &i.column).collect();
     let inputs: Vec<String> = columns.into_iter().cloned().collect();
-    for (o, output) in simulation.outputs.iter().enumerate() {
-        let source = Source { recordings: &estimation, inputs: &inputs, output: &output.column };
-        let model = match rate_of(&estimation, holdout).and_then(|()| model(source, seed).map_err(|e| e.to_string())) {
+    let of_output = |output: &hysid_plant::Output| {
+        let source = Source { recordings: estimation, inputs: &inputs, output: &output.column };
+        rate_of(estimation, holdout).and_then(|()| model(source, seed).map_err(|e| e.to_string()))
+    };
+    simulation.outputs.iter().map(of_output).collect()
+}
+
+/// Fills `rmse_black_box` of the hold-out's entries; a note says why it is missing.
+pub fn score(
+    file: &mut DiagnosisFile,
+    models: Models,
+    picture: &Picture,
+    simulation: &Simulation,
+    intake: &Intake,
+) {
+    let held: Vec<&RecordPicture> = picture.records.iter().filter(|r| r.role == Role::HoldOut).collect();
+    let holdout = if intake.holdout.is_empty() { &intake.estimation } else { &intake.holdout };
+    for (o, (output, model)) in simulation.outputs.iter().zip(models).enumerate() {
+        let model = match model {
             Ok(model) => model,
             Err(why) => {
                 file.notes.push(format!("no black box for `{}` beside the simulation: {why}", output.column));

@@ -5,6 +5,7 @@ mod folder;
 mod intake;
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use anyhow::Context;
@@ -84,14 +85,14 @@ fn work(args: &Args) -> Result<(), Failure> {
     let questions = args.consider.iter().map(|text| question(text)).collect::<Result<Vec<_>, _>>()?;
     let progress = |step: &str| eprintln!("hysid: {step} ...");
     let expired = |share: f64| args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > share * limit);
-    let hooks = Hooks { progress: &progress, expired: &expired };
+    let watch = Watch { progress: &progress, expired: &expired, limited: args.time_limit.is_some() };
     let files = Files { estimation: &args.recording, holdout: &args.holdout };
     let (mut outcome, folder) = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
             let (simulation, name) = simulation_file::read(file)?;
             let intake = files.of_simulation(&simulation)?;
             let folder = Folder::claim(&args.out)?;
-            (answer(&simulation, &name, &intake, &questions, options, &hooks)?, folder)
+            (answer(&simulation, &name, &intake, &questions, options, &watch)?, folder)
         }
         (None, Some(column)) => {
             let output = args.output.clone().unwrap_or_default();
@@ -101,7 +102,7 @@ fn work(args: &Args) -> Result<(), Failure> {
             progress("finding a clone of the simulated column");
             let stand_in =
                 stand_in(&args.input, &output, column, &intake.estimation, args.seed).map_err(Failure::bad_input)?;
-            let mut outcome = answer(&stand_in.simulation, column, &intake, &questions, options, &hooks)?;
+            let mut outcome = answer(&stand_in.simulation, column, &intake, &questions, options, &watch)?;
             if let Some(moved) = stand_in.moved(&outcome.file.calibrated_parameters) {
                 if outcome.file.verdict == VerdictKind::NoSignificantMismatch {
                     outcome.file.summary = format!("{} {moved}", outcome.file.summary);
@@ -151,21 +152,52 @@ fn question(text: &str) -> Result<Question, Failure> {
         .collect()
 }
 
+/// How a diagnosis is followed and limited.
+struct Watch<'a> {
+    progress: &'a (dyn Fn(&str) + Sync),
+    /// Whether this share of the time limit is used up.
+    expired: &'a (dyn Fn(f64) -> bool + Sync),
+    /// Whether there is a limit.
+    limited: bool,
+}
+
 /// The diagnosis, with a black box beside it.
+///
+/// Without a time limit the black box is learnt while the search goes on: some steps of either leave processors idle.
 fn answer(
     simulation: &Simulation,
     file: &str,
     intake: &Intake,
     questions: &[Question],
     options: Options,
-    hooks: &Hooks<'_>,
+    watch: &Watch<'_>,
 ) -> Result<Diagnosis, Failure> {
     let request =
         Request { simulation, file, estimation: &intake.estimation, holdout: &intake.holdout, questions, options };
-    let mut outcome = diagnose(&request, hooks).map_err(|e| refused(&e, &request))?;
-    if !(hooks.expired)(1.0) {
-        (hooks.progress)("identifying a black box for comparison");
-        black_box::score(&mut outcome.file, &outcome.picture, simulation, intake, options.seed);
+    let told = || (watch.progress)("identifying a black box for comparison");
+    let models: OnceLock<black_box::Models> = OnceLock::new();
+    let outcome = rayon::scope(|scope| {
+        let beside = || {
+            if let Some(learn) = black_box::early(simulation, intake, options.seed).filter(|_| !watch.limited) {
+                told();
+                scope.spawn(|_| {
+                    // Nobody else sets it.
+                    let _ = models.set(learn());
+                });
+            }
+        };
+        let hooks = Hooks { progress: watch.progress, expired: watch.expired, accepted: &beside };
+        diagnose(&request, &hooks)
+    });
+    let mut outcome = outcome.map_err(|e| refused(&e, &request))?;
+    let models = models.into_inner().or_else(|| {
+        (!(watch.expired)(1.0)).then(|| {
+            told();
+            black_box::late(&outcome.picture, simulation, intake, options.seed)
+        })
+    });
+    if let Some(models) = models {
+        black_box::score(&mut outcome.file, models, &outcome.picture, simulation, intake);
     }
     Ok(outcome)
 }
