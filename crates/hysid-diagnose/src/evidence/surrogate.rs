@@ -147,8 +147,7 @@ pub fn surrogate_test(
     r: &[f64],
     options: TestOptions,
 ) -> SurrogateTest {
-    let (statistic, best) =
-        largest(groups, &[r.to_vec()], own).pop().unwrap_or((f64::NEG_INFINITY, None));
+    let (statistic, best) = largest(groups, &[r.to_vec()], own).pop().unwrap_or((f64::NEG_INFINITY, None));
     if groups.is_empty() {
         return SurrogateTest { p_value: 1.0, statistic: 0.0, best: None, surrogates: Vec::new() };
     }

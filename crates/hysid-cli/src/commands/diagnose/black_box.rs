@@ -61,13 +61,7 @@ fn models(estimation: &[Recording], holdout: &[Recording], simulation: &Simulati
 }
 
 /// Fills `rmse_black_box` of the hold-out's entries; a note says why it is missing.
-pub fn score(
-    file: &mut DiagnosisFile,
-    models: Models,
-    picture: &Picture,
-    simulation: &Simulation,
-    intake: &Intake,
-) {
+pub fn score(file: &mut DiagnosisFile, models: Models, picture: &Picture, simulation: &Simulation, intake: &Intake) {
     let held: Vec<&RecordPicture> = picture.records.iter().filter(|r| r.role == Role::HoldOut).collect();
     let holdout = if intake.holdout.is_empty() { &intake.estimation } else { &intake.holdout };
     for (o, (output, model)) in simulation.outputs.iter().zip(models).enumerate() {
