@@ -3,7 +3,8 @@
 use hysid_plant::Simulation;
 
 use crate::data::DataSet;
-use crate::evidence::{Projector, Whitener, norm2};
+use crate::evidence::{ForcePath, NoiseModel, Projector, Whitener, norm2};
+use crate::force::force_paths;
 use crate::model::{Model, Values};
 use crate::refit::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};
 
@@ -39,6 +40,8 @@ pub struct Base<'d> {
     pub fit: Fit,
     /// The noise of its residual.
     pub whitener: Whitener,
+    /// Ways of an unknown force to each output; none where no noise is coloured.
+    pub paths: Vec<Vec<ForcePath>>,
     /// Log likelihood of the residual under that noise, less half of `ln n` for each coefficient of the noise model.
     pub log_likelihood: f64,
 }
@@ -54,10 +57,12 @@ pub enum Start<'a> {
 
 /// Fits a simulation: alternately the unknowns under the noise model and the noise model on the residual.
 ///
-/// The first round uses `whitener`, or white noise where there is none. `None` where the simulation diverges at the start.
+/// `pushed` names the states whose derivative an unknown force may enter. The first round uses `whitener`, or white noise where there is none.
+/// `None` where the simulation diverges at the start.
 pub fn fit_simulation<'d>(
     model: Model<'d>,
     start: Start<'_>,
+    pushed: &[String],
     whitener: Option<&Whitener>,
     rounds: usize,
     options: LmOptions,
@@ -67,9 +72,10 @@ pub fn fit_simulation<'d>(
     let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
     let mut noise = match whitener {
         Some(w) if kind == NoiseKind::Coloured || w.order() == 0 => w.clone(),
-        _ => data.layout.fit_noise(&data.y, 0),
+        _ => data.layout.fit_noise(&data.y, 0, &[]),
     };
     let mut fit: Option<Fit> = None;
+    let mut paths = Vec::new();
     for _ in 0..rounds.max(1) {
         let f = match (&fit, start) {
             (Some(before), _) | (None, Start::Fit(before)) => {
@@ -79,12 +85,15 @@ pub fn fit_simulation<'d>(
                 levenberg_marquardt(&model, &model.theta(values), &data.layout, &noise, None, options)?
             }
         };
-        noise = data.layout.fit_noise(&f.residual, order);
+        if order > 0 {
+            paths = force_paths(&model, &f.theta, pushed);
+        }
+        noise = data.layout.fit_noise(&f.residual, order, &paths);
         fit = Some(f);
     }
     let fit = fit?;
     let log_likelihood = kind.share() * log_likelihood(data, &noise, &fit.residual);
-    Some(Base { model, fit, whitener: noise, log_likelihood })
+    Some(Base { model, fit, whitener: noise, paths, log_likelihood })
 }
 
 /// Log likelihood of a residual under a noise model, up to a constant of the data set.
@@ -121,6 +130,11 @@ impl Base<'_> {
     /// Whether the residual is mismatch throughout: its own past predicts it too well for noise.
     pub fn gross(&self) -> bool {
         self.whitener.models.iter().any(|m| m.innovation() < GROSS * m.noise_rms())
+    }
+
+    /// Whether the noise of an output is that of an unknown force through the plant.
+    pub fn driven(&self) -> bool {
+        self.whitener.models.iter().any(NoiseModel::is_driven)
     }
 
     /// Whether the simulation is so far from the recording that its parameters say little.

@@ -28,7 +28,7 @@ pub fn free_run(document: &Simulation, data: &DataSet, own_states: &[String], su
     let free = !model.unknowns().is_empty();
     let mut values = Values::default();
     if free && !head.y.is_empty() {
-        let noise: Whitener = head.layout.fit_noise(&head.y, 0);
+        let noise: Whitener = head.layout.fit_noise(&head.y, 0, &[]);
         let start = model.theta(&values);
         let options = LmOptions { iterations: 25, ..LmOptions::default() };
         // A few starts: a free initial state of a hysteretic element can lie on another branch.

@@ -77,6 +77,8 @@ pub struct Setting<'d> {
     pub original: Simulation,
     /// Names of its states.
     pub own_states: Vec<String>,
+    /// Names of the states whose derivative an unknown force or flow may enter.
+    pub pushed: Vec<String>,
     /// Integration steps in each period.
     pub substeps: usize,
     /// Number of unknowns of the simulation without effects.
@@ -99,7 +101,7 @@ impl<'d> Setting<'d> {
     ) -> Option<Base<'d>> {
         let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
         let options = LmOptions { iterations, ..LmOptions::default() };
-        fit_simulation(model, Start::Values(start), noise, rounds, options, self.noise)
+        fit_simulation(model, Start::Values(start), &self.pushed, noise, rounds, options, self.noise)
     }
 
     /// Goes on with a fitted document; the noise model is that given, then its own.
@@ -112,7 +114,7 @@ impl<'d> Setting<'d> {
     ) -> Option<Base<'d>> {
         let model = Model::new(base.model.simulation(), self.data, &self.own_states, self.substeps).ok()?;
         let options = LmOptions { iterations, ..LmOptions::default() };
-        fit_simulation(model, Start::Fit(&base.fit), noise, rounds, options, self.noise)
+        fit_simulation(model, Start::Fit(&base.fit), &self.pushed, noise, rounds, options, self.noise)
     }
 
     /// A fitted document as a hypothesis.

@@ -21,6 +21,7 @@ mod error;
 mod experiment;
 mod firmness;
 mod fitting;
+mod force;
 mod hold;
 mod hypothesis;
 mod joint;

@@ -341,6 +341,29 @@ impl<'d> Model<'d> {
         outputs.into_iter().map(stack).collect()
     }
 
+    /// The equations linearised at `instants` of the stretches, evenly spread over all samples; empty where the run diverges.
+    pub fn linearised(&self, theta: &[f64], instants: usize) -> Vec<hysid_plant::Linearisation> {
+        let (responses, diverged) = self.responses(theta);
+        let all = self.data.samples();
+        if diverged.is_some() || all == 0 {
+            return Vec::new();
+        }
+        let parameters = self.parameters(theta, &[]);
+        (0..instants)
+            .filter_map(|i| {
+                let mut n = (2 * i + 1) * all / (2 * instants);
+                let (stretch, response) = self.data.stretches.iter().zip(&responses).find(|(s, _)| {
+                    let here = n < s.len();
+                    n -= if here { 0 } else { s.len() };
+                    here
+                })?;
+                let x: Vec<f64> = response.states.iter().map(|s| s[n]).collect();
+                let u: Vec<f64> = stretch.drive.inputs().iter().map(|s| s[n]).collect();
+                Some(self.compiled.linearise(&parameters, &x, &u))
+            })
+            .collect()
+    }
+
     /// The simulation with these values in it (initial values stay as the document has them).
     pub fn document(&self, theta: &[f64]) -> Simulation {
         let mut simulation = self.simulation().clone();

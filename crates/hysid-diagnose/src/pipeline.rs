@@ -12,6 +12,7 @@ use crate::evidence::correlation_time;
 use crate::experiment::{present_separation, propose};
 use crate::file::*;
 use crate::firmness::{firmness, likelihoods};
+use crate::force::pushed;
 use crate::hold::free_run;
 use crate::hypothesis::Setting;
 use crate::left::Left;
@@ -131,6 +132,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         data: &data,
         original: simulation.clone(),
         own_states,
+        pushed: pushed(simulation),
         substeps: 2,
         own_unknowns: 0,
         iterations: 12,

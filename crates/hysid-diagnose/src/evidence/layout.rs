@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::noise::NoiseModel;
+use super::response::ForcePath;
 
 /// A run of rows that follow each other in time: one output of one stretch, between gaps.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,13 +38,13 @@ impl Layout {
         self.len() == 0
     }
 
-    /// One noise model for each output, fitted to this stacked residual.
-    pub fn fit_noise(&self, residual: &[f64], max_order: usize) -> Whitener {
+    /// One noise model for each output, fitted to this stacked residual; `paths[output]` are the ways of an unknown force to it, where there are any.
+    pub fn fit_noise(&self, residual: &[f64], max_order: usize, paths: &[Vec<ForcePath>]) -> Whitener {
         let models = (0..self.outputs)
             .map(|o| {
                 let stretches: Vec<&[f64]> =
                     self.series.iter().filter(|s| s.output == o).map(|s| &residual[s.rows.clone()]).collect();
-                NoiseModel::fit(&stretches, max_order)
+                NoiseModel::fit(&stretches, max_order, paths.get(o).map_or(&[], Vec::as_slice))
             })
             .collect();
         Whitener { models }

@@ -13,12 +13,15 @@ mod ar;
 mod layout;
 mod noise;
 mod projector;
+mod response;
 mod score;
+mod shape;
 mod surrogate;
 
 pub use ar::{AR_ORDERS, ArModel, fit_ar};
 pub use layout::{Layout, Series, Whitener};
-pub use noise::{NoiseModel, SpectralShape};
+pub use noise::NoiseModel;
 pub use projector::{Projector, dot, norm2};
+pub use response::ForcePath;
 pub use score::{FeatureGroup, detectable_amplitude, score};
 pub use surrogate::{SurrogateTest, TestOptions, correlation_time, surrogate_test};

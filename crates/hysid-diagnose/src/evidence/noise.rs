@@ -1,177 +1,30 @@
-//! The noise of an output: an autoregression, and the shape that the spectrum of its innovations still has on a logarithmic frequency axis.
+//! The noise of an output: an autoregression with the shape that the spectrum of its innovations still has on a logarithmic frequency axis, or
+//! an unknown force that passes through the plant.
 //!
 //! An autoregression of order 16 resolves a sixteenth of the sampling frequency. Noise that rises towards low frequency (1/f, drift of a
 //! sensor) and a slow mismatch in a recording that was sampled a hundred times faster both lie below that. Without the shape such a
-//! residual would count as white, and a model that removes it would gain nothing in likelihood. The shape is piecewise linear in the
-//! logarithms of frequency and power, with knots one or two octaves apart or a single corner, fitted by Whittle's likelihood; BIC decides
-//! whether it is there.
+//! residual would count as white, and a model that removes it would gain nothing in likelihood. BIC decides whether the shape is there, and
+//! whether process noise ([`super::ForcePath`]) says the same in fewer coefficients.
 //!
-//! Whitening divides the discrete Fourier transform of the autoregression's innovations by the root of the shape: an orthogonal transform, a
-//! scaling, and back. The rows stay in order of time. The residual's wrap from end to start is the approximation (the autoregression has
+//! The shape is taken from the autoregression's innovations. Their wrap from end to start is the approximation (the autoregression has
 //! taken the steep part of the spectrum by then).
-//!
-//! Reference: P. Whittle (1953); P. J. Brockwell and R. A. Davis, Time Series, section 10.8.
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 
-use hysid_signal::{fourier, inverse_fourier};
-use nalgebra::{DMatrix, DVector};
+use hysid_signal::fourier;
 
 use super::ar::{ArModel, fit_ar};
 use super::projector::norm2;
+use super::response::{Driven, ForcePath};
+use super::shape::{SpectralShape, corners, even_knots, log_frequency, multiplicity};
 
-/// Standard deviation of the prior of a knot's log power about 0: what the simulation's own parameters have taken out of the residual
-/// must not look like a noise of power zero.
-const PRIOR_SD: f64 = 3.0;
 /// Orders up to which a short autoregression is tried with a corner, beside the one that BIC chooses without a shape.
 const SHORT_ORDERS: [usize; 2] = [0, 2];
 /// Bins of an octave that lines are gathered in.
 const BINS: f64 = 24.0;
-/// Fewest samples for a shape.
+/// Fewest samples for a shape or for process noise.
 const SHORTEST: usize = 128;
-
-/// Log power against log frequency.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SpectralShape {
-    /// Natural logarithm of the frequencies of the knots, in cycles a sample, ascending.
-    knots: Vec<f64>,
-    /// Natural logarithm of the power at the knots; 0 is the power of the autoregression's innovations.
-    heights: Vec<f64>,
-}
-
-/// Line `k` of `n` samples as a logarithm of frequency; the mean counts as half the first line.
-fn log_frequency(k: usize, n: usize) -> f64 {
-    ((k as f64).max(0.5) / n as f64).ln()
-}
-
-/// How many real numbers line `k` of `n` samples stands for.
-fn multiplicity(k: usize, n: usize) -> f64 {
-    if k == 0 || 2 * k == n { 1.0 } else { 2.0 }
-}
-
-/// Knots everywhere between the lowest frequency of `n` samples and the highest, one or two octaves apart.
-fn even_knots(n: usize) -> Vec<Vec<f64>> {
-    let (low, high) = ((1.0 / n as f64).ln(), 0.5f64.ln());
-    let even = |octaves: f64| {
-        let count = ((high - low) / (octaves * LN_2)).round().max(1.0) as usize;
-        (0..=count).map(|i| low + (high - low) * i as f64 / count as f64).collect()
-    };
-    vec![even(1.0), even(2.0)]
-}
-
-/// A single knot between the lowest frequency of `n` samples and the highest, at each octave.
-///
-/// Noise that rises below a corner (1/f, a random walk beside white noise) is so told in a few coefficients: were only the many on offer,
-/// an effect with two would be a cheap way to say the same.
-fn corners(n: usize) -> Vec<Vec<f64>> {
-    let (low, high) = ((1.0 / n as f64).ln(), 0.5f64.ln());
-    let last = ((high - low) / LN_2).floor() as usize;
-    (2..last).map(|octave| vec![low, low + octave as f64 * LN_2, high]).collect()
-}
-
-/// The two knots around `x` and the weight of the upper one.
-fn between(knots: &[f64], x: f64) -> (usize, f64) {
-    let last = knots.len() - 1;
-    if last == 0 || x <= knots[0] {
-        return (0, 0.0);
-    }
-    if x >= knots[last] {
-        return (last - 1, 1.0);
-    }
-    let upper = knots.partition_point(|k| *k <= x).clamp(1, last);
-    (upper - 1, (x - knots[upper - 1]) / (knots[upper] - knots[upper - 1]))
-}
-
-impl SpectralShape {
-    /// Natural logarithm of the power at line `k` of `n` samples.
-    fn log_power(&self, k: usize, n: usize) -> f64 {
-        let (i, w) = between(&self.knots, log_frequency(k, n));
-        let above = self.heights.get(i + 1).copied().unwrap_or(self.heights[i]);
-        (1.0 - w) * self.heights[i] + w * above
-    }
-
-    /// Multiplies the lines of `x` by `exp(sign/2 log power)` in place.
-    fn scale(&self, x: &mut [f64], sign: f64) {
-        let n = x.len();
-        let mut lines = fourier(x);
-        for (k, line) in lines.iter_mut().enumerate() {
-            let factor = (0.5 * sign * self.log_power(k, n)).exp();
-            line.0 *= factor;
-            line.1 *= factor;
-        }
-        x.copy_from_slice(&inverse_fourier(&lines, n));
-    }
-
-    /// Number of coefficients: heights, and the place of a single corner.
-    fn coefficients(&self) -> usize {
-        self.heights.len() + usize::from(self.heights.len() == 3)
-    }
-
-    /// Half the logarithm of the determinant of `n` samples' covariance.
-    fn log_scale(&self, n: usize) -> f64 {
-        (0..=n / 2).map(|k| 0.5 * multiplicity(k, n) * self.log_power(k, n)).sum()
-    }
-
-    /// Fits heights at `knots` to the lines of several series: (log frequency, power, multiplicity). Returns the shape and its gain in log
-    /// likelihood over a flat spectrum of power 1.
-    fn fit(knots: Vec<f64>, lines: &[(f64, f64, f64)]) -> Option<(Self, f64)> {
-        let m = knots.len();
-        let at: Vec<(usize, f64)> = lines.iter().map(|l| between(&knots, l.0)).collect();
-        let eta = |heights: &[f64], (i, w): (usize, f64)| {
-            (1.0 - w) * heights[i] + w * heights.get(i + 1).copied().unwrap_or(heights[i])
-        };
-        let cost = |heights: &[f64]| -> f64 {
-            let whittle: f64 = lines
-                .iter()
-                .zip(&at)
-                .map(|(l, a)| {
-                    let e = eta(heights, *a);
-                    0.5 * l.2 * (e + l.1 * (-e).exp())
-                })
-                .sum();
-            whittle + heights.iter().map(|h| 0.5 * (h / PRIOR_SD).powi(2)).sum::<f64>()
-        };
-        let mut heights = vec![0.0; m];
-        let flat = cost(&heights);
-        let mut best = flat;
-        for _ in 0..40 {
-            // Fisher scoring.
-            let mut information = DMatrix::from_diagonal_element(m, m, PRIOR_SD.powi(-2));
-            let mut gradient = DVector::from_iterator(m, heights.iter().map(|h| -h / (PRIOR_SD * PRIOR_SD)));
-            for (l, &(i, w)) in lines.iter().zip(&at) {
-                let e = eta(&heights, (i, w));
-                let slope = 0.5 * l.2 * (l.1 * (-e).exp() - 1.0);
-                let j = (i + 1).min(m - 1);
-                for (a, wa) in [(i, 1.0 - w), (j, w)] {
-                    gradient[a] += slope * wa;
-                    for (b, wb) in [(i, 1.0 - w), (j, w)] {
-                        information[(a, b)] += 0.5 * l.2 * wa * wb;
-                    }
-                }
-            }
-            let step = information.cholesky()?.solve(&gradient);
-            let mut share = 1.0;
-            let mut moved = false;
-            while share > 1e-3 {
-                let trial: Vec<f64> =
-                    heights.iter().zip(step.iter()).map(|(h, s)| h + share * s.clamp(-3.0, 3.0)).collect();
-                let c = cost(&trial);
-                if c < best {
-                    moved = best - c > 1e-6;
-                    best = c;
-                    heights = trial;
-                    break;
-                }
-                share *= 0.5;
-            }
-            if !moved {
-                break;
-            }
-        }
-        Some((Self { knots, heights }, flat - best))
-    }
-}
 
 impl ArModel {
     /// With the shape that the spectrum of its innovations has, where BIC asks for one.
@@ -186,7 +39,7 @@ impl ArModel {
             for (k, (re, im)) in fourier(&w).iter().enumerate().skip(1) {
                 let power = (re * re + im * im) / n as f64;
                 if !power.is_finite() {
-                    return NoiseModel { ar: self, shape: None };
+                    return NoiseModel::of(self, None);
                 }
                 // Neighbours between which no shape bends are one line of higher multiplicity.
                 let (x, m) = (log_frequency(k, n), multiplicity(k, n));
@@ -204,35 +57,46 @@ impl ArModel {
                 best = (Some(shape), gain);
             }
         }
-        NoiseModel { ar: self, shape: best.0 }
+        NoiseModel::of(self, best.0)
     }
 }
 
 /// The noise of one output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
-    ar: ArModel,
-    shape: Option<SpectralShape>,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Kind {
+    Shaped(ArModel, Option<SpectralShape>),
+    Driven(Driven),
 }
 
 impl NoiseModel {
-    /// White noise of this standard deviation.
-    pub fn white(sigma: f64) -> Self {
-        Self { ar: ArModel::white(sigma), shape: None }
+    fn of(ar: ArModel, shape: Option<SpectralShape>) -> Self {
+        Self { kind: Kind::Shaped(ar, shape) }
     }
 
-    /// The noise of these stretches of one residual: an autoregression up to `max_order` (0: white) and the shape where BIC asks for it.
+    /// White noise of this standard deviation.
+    pub fn white(sigma: f64) -> Self {
+        Self::of(ArModel::white(sigma), None)
+    }
+
+    /// The noise of these stretches of one residual: an autoregression up to `max_order` (0: white) and the shape where BIC asks for it, or
+    /// process noise by one of these ways where BIC prefers that.
     ///
     /// A short autoregression with a corner may say in few coefficients what a long one says in many, so both are tried.
-    pub fn fit(stretches: &[&[f64]], max_order: usize) -> Self {
+    pub fn fit(stretches: &[&[f64]], max_order: usize, paths: &[ForcePath]) -> Self {
         let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
-        let whole = Self { ar: fit_ar(stretches, max_order), shape: None };
+        let ar = fit_ar(stretches, max_order);
         if max_order == 0 || longest < SHORTEST {
-            return whole;
+            return Self::of(ar, None);
         }
         let bent = corners(longest);
-        let mut best = whole.ar.shaped(stretches, &[even_knots(longest), bent.clone()].concat());
-        let (mut most, mut seen) = (best.score(stretches), vec![best.order()]);
+        let mut seen = vec![ar.order()];
+        let mut best = ar.shaped(stretches, &[even_knots(longest), bent.clone()].concat());
+        let mut most = best.score(stretches);
         for order in SHORT_ORDERS {
             let short = fit_ar(stretches, order);
             if !seen.contains(&short.order()) {
@@ -242,6 +106,18 @@ impl NoiseModel {
                 if score > most {
                     (best, most) = (shaped, score);
                 }
+            }
+        }
+        if best.coefficients() == 0 {
+            return best;
+        }
+        let total: usize = stretches.iter().map(|s| s.len()).sum();
+        let price = 0.5 * (total as f64).ln();
+        for path in paths {
+            let Some((driven, likelihood)) = Driven::fit(path, stretches, price) else { continue };
+            let score = likelihood - price * driven.coefficients() as f64;
+            if score > most {
+                (best, most) = (Self { kind: Kind::Driven(driven) }, score);
             }
         }
         best
@@ -263,49 +139,81 @@ impl NoiseModel {
 
     /// Number of coefficients beyond the scale.
     pub fn coefficients(&self) -> usize {
-        self.ar.order() + self.shape.as_ref().map_or(0, SpectralShape::coefficients)
+        match &self.kind {
+            Kind::Shaped(ar, shape) => ar.order() + shape.as_ref().map_or(0, SpectralShape::coefficients),
+            Kind::Driven(driven) => driven.coefficients(),
+        }
     }
 
-    /// Order of the autoregression.
+    /// Order of the autoregression, or of the filter; 0 for white noise.
     pub fn order(&self) -> usize {
-        self.ar.order()
+        match &self.kind {
+            Kind::Shaped(ar, _) => ar.order(),
+            Kind::Driven(driven) => driven.order(),
+        }
     }
 
-    /// Standard deviation of the autoregression's innovations.
+    /// Whether it is that of a force through the plant.
+    pub fn is_driven(&self) -> bool {
+        matches!(self.kind, Kind::Driven(_))
+    }
+
+    /// Standard deviation of the innovations.
     pub fn innovation(&self) -> f64 {
-        self.ar.innovation()
+        match &self.kind {
+            Kind::Shaped(ar, _) => ar.innovation(),
+            Kind::Driven(driven) => driven.innovation(),
+        }
     }
 
     /// Standard deviation of the noise itself.
     pub fn noise_rms(&self) -> f64 {
-        self.ar.noise_rms()
+        match &self.kind {
+            Kind::Shaped(ar, _) => ar.noise_rms(),
+            Kind::Driven(driven) => driven.noise_rms(),
+        }
     }
 
     /// Whitens one contiguous stretch into `out` (same length): unit variance where the model holds.
     pub fn whiten(&self, e: &[f64], out: &mut [f64]) {
-        self.ar.whiten(e, out);
-        if let Some(shape) = &self.shape {
-            shape.scale(out, -1.0);
+        match &self.kind {
+            Kind::Shaped(ar, shape) => {
+                ar.whiten(e, out);
+                if let Some(shape) = shape {
+                    shape.scale(out, -1.0);
+                }
+            }
+            Kind::Driven(driven) => driven.whiten(e, out),
         }
     }
 
     /// Colours unit white noise in place: the inverse of [`NoiseModel::whiten`].
     pub fn colour(&self, w: &mut [f64]) {
-        if let Some(shape) = &self.shape {
-            shape.scale(w, 1.0);
+        match &self.kind {
+            Kind::Shaped(ar, shape) => {
+                if let Some(shape) = shape {
+                    shape.scale(w, 1.0);
+                }
+                ar.colour(w);
+            }
+            Kind::Driven(driven) => driven.colour(w),
         }
-        self.ar.colour(w);
     }
 
     /// Logarithm of the determinant of the transformation of `n` samples from white: their share of a log likelihood.
     pub fn log_scale(&self, n: usize) -> f64 {
-        n as f64 * self.innovation().ln() + self.shape.as_ref().map_or(0.0, |s| s.log_scale(n))
+        match &self.kind {
+            Kind::Shaped(ar, shape) => n as f64 * ar.innovation().ln() + shape.as_ref().map_or(0.0, |s| s.log_scale(n)),
+            Kind::Driven(driven) => driven.log_scale(n),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hysid_signal::inverse_fourier;
+    use nalgebra::DMatrix;
     use crate::evidence::norm2;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -336,7 +244,7 @@ mod tests {
     fn one_over_f_noise_is_white_down_to_the_lowest_lines() {
         for seed in 0..5 {
             let e = pink(4000, seed);
-            let low = lowest(&NoiseModel::fit(&[&e], 16), &e);
+            let low = lowest(&NoiseModel::fit(&[&e], 16, &[]), &e);
             assert!((0.5..1.8).contains(&low), "{low}");
         }
     }
@@ -344,24 +252,24 @@ mod tests {
     #[test]
     fn white_and_autoregressive_noise_need_no_shape() {
         let mut e = white(3000, 3);
-        assert_eq!(NoiseModel::fit(&[&e], 16).coefficients(), 0);
+        assert_eq!(NoiseModel::fit(&[&e], 16, &[]).coefficients(), 0);
         for n in 1..e.len() {
             e[n] += 0.9 * e[n - 1];
         }
-        assert!(NoiseModel::fit(&[&e], 16).shape.is_none());
+        assert!(matches!(NoiseModel::fit(&[&e], 16, &[]).kind, Kind::Shaped(_, None)));
     }
 
     #[test]
     fn whitening_and_colouring_are_inverse_and_the_determinant_is_that_of_the_map() {
-        let m = NoiseModel::fit(&[&pink(4000, 1)], 2);
-        assert!(m.shape.is_some());
+        let m = NoiseModel::fit(&[&pink(4000, 1)], 2, &[]);
+        let Kind::Shaped(_, Some(shape)) = &m.kind else { panic!("a shape") };
         let e = pink(600, 2);
         let mut w = vec![0.0; 600];
         m.whiten(&e, &mut w);
         m.colour(&mut w);
         assert!(e.iter().zip(&w).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + a.abs())));
         // The shape's determinant, column by column, on a short stretch.
-        let (n, shape) = (41, m.shape.unwrap());
+        let n = 41;
         let columns: Vec<f64> = (0..n)
             .flat_map(|i| {
                 let mut unit = vec![0.0; n];
@@ -388,7 +296,7 @@ mod tests {
         }
         let with: Vec<f64> = e.iter().zip(&slow).map(|(e, s)| e + s).collect();
         let likelihood = |e: &[f64]| {
-            let m = NoiseModel::fit(&[e], 16);
+            let m = NoiseModel::fit(&[e], 16, &[]);
             let mut w = vec![0.0; n];
             m.whiten(e, &mut w);
             -0.5 * norm2(&w) - m.log_scale(n)

@@ -276,7 +276,7 @@ mod tests {
         let (layout, own, effects) = features(seed);
         let mut r0 = e.to_vec();
         Projector::new(own.clone()).remove(&mut r0);
-        let whitener: Whitener = layout.fit_noise(&r0, 16);
+        let whitener: Whitener = layout.fit_noise(&r0, 16, &[]);
         let own = Projector::new(own.iter().map(|c| whitener.apply(&layout, c)));
         let mut r = whitener.apply(&layout, e);
         own.remove(&mut r);

@@ -55,7 +55,7 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let terms = terms(base);
     let mut noises = vec![base.whitener.clone()];
     if kind == NoiseKind::Coloured && base.coloured() {
-        noises.push(data.layout.fit_noise(&base.fit.residual, 0));
+        noises.push(data.layout.fit_noise(&base.fit.residual, 0, &[]));
     }
     let best =
         noises.iter().filter_map(|noise| choose(base, kind, &terms, noise)).max_by(|a, b| a.gain.total_cmp(&b.gain))?;
@@ -115,7 +115,7 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
     let mut left = noise.clone();
     let (mut coefficients, mut after) = regress(base, &picked, &left, None);
     for _ in 0..2 {
-        left = layout.fit_noise(&after, order);
+        left = layout.fit_noise(&after, order, &base.paths);
         (coefficients, after) = regress(base, &picked, &left, None);
     }
     let data = base.model.data();
