@@ -57,3 +57,47 @@ fn middle(values: impl Iterator<Item = f64>) -> f64 {
     let half = &all[quarter..all.len() - quarter];
     half.iter().sum::<f64>() / half.len().max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::DataSet;
+    use crate::model::Values;
+    use hysid_plant::Drive;
+
+    /// A drive with dry friction that is pushed to and fro, sticking for part of the time; the state of a loop where there is one.
+    fn paths(force: &str) -> Vec<Vec<ForcePath>> {
+        let text = format!(
+            "[time]\nperiod_s = 0.05\n[inputs]\nu = \"u_Nm\"\n[parameters]\nb = {{ value = 0.5, min = 0.0 }}\n[states]\nq = {{ derivative = \"w\", initial = 0.0 }}\nw = {{ derivative = \"({force})/2\", initial = 0.0 }}\n[outputs]\nq_rad = \"q\"\n"
+        );
+        let simulation = Simulation::parse(&text, "drive.sim.toml").unwrap();
+        let u: Vec<f64> = (0..600).map(|n| 3.0 * (n as f64 * 0.07).sin()).collect();
+        let drive = Drive::new(0.0, 0.05, u.len(), vec![u.clone()]).unwrap();
+        let data = DataSet::of_drive(drive, vec![vec![0.0; u.len()]], 0.05);
+        let model = Model::new(&simulation, &data, &["q".into(), "w".into()], 2).unwrap();
+        let names = pushed(&simulation);
+        assert_eq!(names, ["w"]);
+        force_paths(&model, &model.theta(&Values::default()), &names)
+    }
+
+    fn by_hand(stiffness: f64) -> Vec<Vec<ForcePath>> {
+        vec![vec![ForcePath::held(&[0.0, 1.0, -stiffness, -0.25], 1, &[1.0, 0.0], 0.05).unwrap()]]
+    }
+
+    #[test]
+    fn a_drive_with_friction_answers_as_it_does_while_it_moves() {
+        assert_eq!(paths("u - b*w - sign(w)"), by_hand(0.0));
+    }
+
+    #[test]
+    fn a_loop_in_the_simulation_is_closed() {
+        assert_eq!(paths("8*(u - q) - b*w"), by_hand(4.0));
+    }
+
+    #[test]
+    fn moments_of_sticking_do_not_count() {
+        let values = [1.0, 1.0, 1e6, 1.0, f64::NAN, 1.0, -1e6, 1.0, 1.0];
+        assert_eq!(middle(values.into_iter()), 1.0);
+        assert_eq!(middle(std::iter::empty()), 0.0);
+    }
+}

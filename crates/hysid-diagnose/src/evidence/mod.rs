@@ -10,6 +10,7 @@
 //! Reference: efficient score tests (Neyman C(alpha)); circular-shift surrogates for dependent data.
 
 mod ar;
+mod driven;
 mod layout;
 mod noise;
 mod projector;

@@ -15,8 +15,9 @@ use std::f64::consts::LN_2;
 use hysid_signal::fourier;
 
 use super::ar::{ArModel, fit_ar};
+use super::driven::Driven;
 use super::projector::norm2;
-use super::response::{Driven, ForcePath};
+use super::response::ForcePath;
 use super::shape::{SpectralShape, corners, even_knots, log_frequency, multiplicity};
 
 /// Orders up to which a short autoregression is tried with a corner, beside the one that BIC chooses without a shape.

@@ -1,4 +1,4 @@
-//! Process noise: an unknown force that reaches an output through the plant, beside white noise of the sensor.
+//! The way of an unknown force through the plant to an output, and the filter that whitens what it makes beside white noise of the sensor.
 //!
 //! `x[k+1] = A x[k] + B w[k]`, `y[k] = C x[k] + e[k]`: `w` is the force, held through a row's period, white or a first-order autoregression; `e` is white.
 //! Far from the start the power spectrum is `sigma_e^2 + sigma_w^2 |G|^2` with the plant's own response `G`: a resonance is told in one
@@ -12,19 +12,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::projector::norm2;
-
-/// Poles of the force's autoregression, white first: samples of memory double from one to the next.
-const POLES: [f64; 5] = [0.0, 0.5, 0.75, 0.88, 0.94];
-/// Decades between the first guesses of the share of the force, and where the search ends.
-const DECADES: (f64, f64) = (1.0, 0.125);
-/// Decades of the share of the force in the output's power that are searched.
-const RANGE: (f64, f64) = (-3.0, 9.0);
 /// Change of a gain below which the filter has settled.
 const SETTLED: f64 = 1e-10;
-/// Rows of the longest stretch that a scale of the response is taken from.
-const SCALE_ROWS: usize = 4000;
-
 /// The way from a force to one output, from row to row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForcePath {
@@ -88,7 +77,7 @@ impl ForcePath {
     }
 
     /// Variance of the output, `rows` rows from the start, for a force of unit variance.
-    fn variance(&self, pole: f64, rows: usize) -> f64 {
+    pub(super) fn variance(&self, pole: f64, rows: usize) -> f64 {
         let (a, c, added, mut p) = self.noise(pole);
         let mut last = 0.0;
         for _ in 0..rows {
@@ -105,16 +94,16 @@ impl ForcePath {
 
 /// One row's part in the filter.
 #[derive(Debug, Clone, PartialEq)]
-struct Step {
+pub(super) struct Step {
     /// Standard deviation of the innovation.
-    sigma: f64,
+    pub(super) sigma: f64,
     /// What an innovation adds to the predicted state.
     gain: Vec<f64>,
 }
 
 /// The filter of a path and a share of the force, for noise of the sensor with unit variance.
 #[derive(Debug, Clone, PartialEq)]
-struct Filter {
+pub(super) struct Filter {
     /// By rows.
     a: Vec<f64>,
     c: Vec<f64>,
@@ -124,7 +113,7 @@ struct Filter {
 
 impl Filter {
     /// For stretches of up to `rows` rows and a force of this variance; `None` where it is not finite.
-    fn new(path: &ForcePath, pole: f64, variance: f64, rows: usize) -> Option<Self> {
+    pub(super) fn new(path: &ForcePath, pole: f64, variance: f64, rows: usize) -> Option<Self> {
         let (a, c, added, start) = path.noise(pole);
         let (added, mut p) = (added * variance, start * variance);
         let mut steps: Vec<Step> = Vec::new();
@@ -152,12 +141,12 @@ impl Filter {
         Some(Self { a: a.transpose().as_slice().to_vec(), c: c.as_slice().to_vec(), steps })
     }
 
-    fn step(&self, k: usize) -> &Step {
+    pub(super) fn step(&self, k: usize) -> &Step {
         &self.steps[k.min(self.steps.len() - 1)]
     }
 
     /// Runs through a stretch: `f(step, prediction, sample)` gives the innovation.
-    fn run(&self, len: usize, mut f: impl FnMut(&Step, f64, usize) -> f64) {
+    pub(super) fn run(&self, len: usize, mut f: impl FnMut(&Step, f64, usize) -> f64) {
         let n = self.c.len();
         let (mut x, mut next) = (vec![0.0; n], vec![0.0; n]);
         for k in 0..len {
@@ -171,197 +160,44 @@ impl Filter {
         }
     }
 
-    fn log_scale(&self, n: usize) -> f64 {
+    /// Number of states.
+    pub(super) fn order(&self) -> usize {
+        self.c.len()
+    }
+
+    pub(super) fn log_scale(&self, n: usize) -> f64 {
         (0..n).map(|k| self.step(k).sigma.ln()).sum()
     }
 }
 
-/// Process noise on one output.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Driven {
-    filter: Filter,
-    /// Standard deviation of the sensor's noise.
-    sigma: f64,
-    /// Standard deviation of what it was fitted to.
-    rms: f64,
-    coefficients: usize,
-}
-
-/// A point of the search: the decade of the force's share, and what it comes to.
-type Point = (f64, f64, Driven);
-
-impl Driven {
-    /// The process noise of these stretches of one residual by this way, with its log likelihood; colour of the force where it pays `price`.
-    pub fn fit(path: &ForcePath, stretches: &[&[f64]], price: f64) -> Option<(Self, f64)> {
-        let mut best: Option<Point> = None;
-        for (i, pole) in POLES.into_iter().enumerate() {
-            let from = best.as_ref().map_or((0.0, DECADES.0), |b| (b.0, 0.5 * DECADES.0));
-            let Some(found) = Self::search(path, pole, stretches, from) else { break };
-            let (first, bar) = (i == 1, best.as_ref().map_or(f64::NEG_INFINITY, |b| b.1));
-            if found.1 < bar {
-                // A long memory may help where a short one does not.
-                if first {
-                    continue;
-                }
-                break;
-            }
-            if i == 0 || found.1 > bar {
-                best = Some(found);
-            }
-        }
-        let coloured = best?;
-        if coloured.2.coefficients == 1 {
-            return Some((coloured.2, coloured.1));
-        }
-        let white = Self::search(path, 0.0, stretches, (coloured.0, DECADES.0))?;
-        let chosen = if coloured.1 - price > white.1 { coloured } else { white };
-        Some((chosen.2, chosen.1))
-    }
-
-    /// The best share of a force with this pole, from a decade on by steps that shrink.
-    fn search(path: &ForcePath, pole: f64, stretches: &[&[f64]], (start, step): (f64, f64)) -> Option<Point> {
-        let rows = stretches.iter().map(|s| s.len()).max()?;
-        let unit = path.variance(pole, rows.min(SCALE_ROWS));
-        if !(unit > 0.0 && unit.is_finite()) {
-            return None;
-        }
-        let at = |t: f64| -> Option<Point> {
-            let (driven, likelihood) = Self::with(path, pole, 10f64.powf(t) / unit, rows, stretches)?;
-            Some((t, likelihood, driven))
-        };
-        let mut best = at(start)?;
-        let mut step = step;
-        // Likelihoods below and above the best, at the present step.
-        let mut beside = [f64::NAN; 2];
-        while step >= DECADES.1 {
-            let mut moved = false;
-            for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
-                while (RANGE.0..=RANGE.1).contains(&(best.0 + sign * step)) {
-                    let Some(trial) = at(best.0 + sign * step) else { break };
-                    if trial.1 <= best.1 {
-                        beside[side] = trial.1;
-                        break;
-                    }
-                    beside[1 - side] = best.1;
-                    best = trial;
-                    moved = true;
-                }
-                if moved {
-                    break;
-                }
-            }
-            if step * 0.5 < DECADES.1 {
-                break;
-            }
-            step *= 0.5;
-        }
-        // The vertex of the parabola through the last three.
-        let bend = beside[0] + beside[1] - 2.0 * best.1;
-        if bend < 0.0
-            && let Some(vertex) = at(best.0 + step * (0.5 * (beside[0] - beside[1]) / bend).clamp(-0.5, 0.5))
-            && vertex.1 > best.1
-        {
-            best = vertex;
-        }
-        Some(best)
-    }
-
-    /// With this pole and variance of the force, for unit variance of the sensor's noise; the scale of both is that of the stretches.
-    fn with(path: &ForcePath, pole: f64, variance: f64, rows: usize, stretches: &[&[f64]]) -> Option<(Self, f64)> {
-        let filter = Filter::new(path, pole, variance, rows)?;
-        let total: usize = stretches.iter().map(|s| s.len()).sum();
-        let (mut squares, mut power, mut log) = (0.0, 0.0, 0.0);
-        for s in stretches {
-            filter.run(s.len(), |step, predicted, k| {
-                let innovation = s[k] - predicted;
-                squares += (innovation / step.sigma).powi(2);
-                innovation
-            });
-            power += norm2(s);
-            log += filter.log_scale(s.len());
-        }
-        let variance = squares / total as f64;
-        if !(variance > 0.0 && variance.is_finite()) {
-            return None;
-        }
-        let likelihood = -0.5 * total as f64 * (1.0 + variance.ln()) - log;
-        let rms = (power / total as f64).sqrt();
-        let coefficients = if pole == 0.0 { 1 } else { 2 };
-        Some((Self { filter, sigma: variance.sqrt(), rms, coefficients }, likelihood))
-    }
-
-    /// Number of coefficients beyond the scale: the share of the force, its colour.
-    pub fn coefficients(&self) -> usize {
-        self.coefficients
-    }
-
-    /// Number of states of the filter.
-    pub fn order(&self) -> usize {
-        self.filter.c.len()
-    }
-
-    /// Standard deviation of the innovations, far from the start.
-    pub fn innovation(&self) -> f64 {
-        self.sigma * self.filter.step(usize::MAX).sigma
-    }
-
-    /// Standard deviation of what it was fitted to.
-    pub fn noise_rms(&self) -> f64 {
-        self.rms
-    }
-
-    /// Whitens one contiguous stretch into `out` (same length).
-    pub fn whiten(&self, e: &[f64], out: &mut [f64]) {
-        self.filter.run(e.len(), |step, predicted, k| {
-            out[k] = (e[k] - predicted) / (step.sigma * self.sigma);
-            e[k] - predicted
-        });
-    }
-
-    /// Colours unit white noise in place.
-    pub fn colour(&self, w: &mut [f64]) {
-        self.filter.run(w.len(), |step, predicted, k| {
-            let innovation = w[k] * step.sigma * self.sigma;
-            w[k] = predicted + innovation;
-            innovation
-        });
-    }
-
-    /// Logarithm of the determinant of the map from `n` white samples.
-    pub fn log_scale(&self, n: usize) -> f64 {
-        n as f64 * self.sigma.ln() + self.filter.log_scale(n)
-    }
-}
-
+/// Plants and noises that the tests of process noise share.
 #[cfg(test)]
-mod tests {
+pub(super) mod samples {
     use super::*;
-    use crate::evidence::NoiseModel;
-    use hysid_signal::fourier;
     use rand_distr::{Distribution, StandardNormal};
 
-    const PERIOD: f64 = 0.02;
-    /// Natural frequency in rad/s, damping ratio, mass.
-    const PLANT: (f64, f64, f64) = (12.0, 0.05, 2.0);
+    pub const PERIOD: f64 = 0.02;
+    /// Natural frequency in rad/s, damping ratio.
+    pub const PLANT: (f64, f64) = (12.0, 0.05);
 
     /// `x' = v`, `v' = -w^2 x - 2 z w v + force`, `y = x`, and a state that nothing sees.
-    fn oscillator() -> ForcePath {
-        let (w, z, _) = PLANT;
+    pub fn oscillator() -> ForcePath {
+        let (w, z) = PLANT;
         let a = [0.0, 1.0, 0.0, -w * w, -2.0 * z * w, 0.0, 0.0, 1.0, 0.0];
         ForcePath::held(&a, 1, &[1.0, 0.0, 0.0], PERIOD).unwrap()
     }
 
-    fn integrator() -> ForcePath {
+    pub fn integrator() -> ForcePath {
         ForcePath::held(&[0.0, 1.0, 0.0, -0.5], 1, &[1.0, 0.0], PERIOD).unwrap()
     }
 
-    fn white(n: usize, seed: u64) -> Vec<f64> {
+    pub fn white(n: usize, seed: u64) -> Vec<f64> {
         let mut rng = crate::random::generator(seed, 11);
         (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
     }
 
     /// Process noise as the path's own equations make it, beside white noise of unit variance.
-    fn simulated(path: &ForcePath, force: &[f64], size: f64, seed: u64) -> Vec<f64> {
+    pub fn simulated(path: &ForcePath, force: &[f64], size: f64, seed: u64) -> Vec<f64> {
         let mut x = DVector::zeros(path.c.len());
         let sensor = white(force.len(), seed);
         force
@@ -375,7 +211,7 @@ mod tests {
             .collect()
     }
 
-    fn autoregressive(n: usize, pole: f64, seed: u64) -> Vec<f64> {
+    pub fn autoregressive(n: usize, pole: f64, seed: u64) -> Vec<f64> {
         let mut last = 0.0;
         white(n, seed)
             .into_iter()
@@ -385,6 +221,13 @@ mod tests {
             })
             .collect()
     }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::samples::*;
+    use super::*;
+    use hysid_signal::fourier;
 
     #[test]
     fn the_gain_of_a_resonance_is_that_of_its_closed_form() {
@@ -399,7 +242,7 @@ mod tests {
                 y
             })
             .collect();
-        let (w, z, _) = PLANT;
+        let (w, z) = PLANT;
         for (k, (re, im)) in fourier(&response).iter().enumerate().skip(1).take(n / 8) {
             let f = std::f64::consts::TAU * k as f64 / (n as f64 * PERIOD);
             let half = 0.5 * f * PERIOD;
@@ -445,56 +288,15 @@ mod tests {
             let e = white(n, 4);
             let expected = factor.l().solve_lower_triangular(&DVector::from_column_slice(&e)).unwrap();
             let filter = Filter::new(&path, pole, share, n).unwrap();
-            let model = Driven { filter, sigma: 1.0, rms: 1.0, coefficients: 1 };
             let mut w = vec![0.0; n];
-            model.whiten(&e, &mut w);
+            filter.run(n, |step, predicted, k| {
+                w[k] = (e[k] - predicted) / step.sigma;
+                e[k] - predicted
+            });
             assert!(w.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{pole}");
             let log: f64 = factor.l().diagonal().iter().map(|d| d.ln()).sum();
-            assert!((log - model.log_scale(n)).abs() < 1e-6, "{log} {}", model.log_scale(n));
-            model.colour(&mut w);
-            assert!(w.iter().zip(&e).all(|(a, b)| (a - b).abs() < 1e-9));
+            assert!((log - filter.log_scale(n)).abs() < 1e-6, "{log} {}", filter.log_scale(n));
         }
     }
 
-    #[test]
-    fn levels_of_sensor_and_force_come_back() {
-        let path = oscillator();
-        let size = 40.0;
-        let e: Vec<Vec<f64>> =
-            (0..2).map(|i| simulated(&path, &white(6000, 20 + i), size, 40 + i).into_iter().collect()).collect();
-        let (m, _) = Driven::fit(&path, &[&e[0], &e[1]], 4.7).unwrap();
-        assert_eq!(m.coefficients(), 1);
-        assert!((m.sigma - 1.0).abs() < 0.03, "{}", m.sigma);
-        // The variance of the force, from the filter's settled innovation: it grows with the share alone.
-        let same = Filter::new(&path, 0.0, size * size, 6000).unwrap();
-        assert!((m.innovation() / same.step(usize::MAX).sigma - 1.0).abs() < 0.04);
-    }
-
-    #[test]
-    fn what_is_whitened_is_white_and_bic_prefers_the_plant() {
-        // Ljung and Box over 20 lags: chi squared with 20 degrees, 1 in 1000 above 45.3.
-        for (path, size, pole) in [(oscillator(), 20.0, 0.0), (integrator(), 30.0, 0.0), (oscillator(), 60.0, 0.9)] {
-            let e = simulated(&path, &autoregressive(4000, pole, 1), size, 2);
-            let m = NoiseModel::fit(&[&e], 16, std::slice::from_ref(&path));
-            assert!(m.is_driven() && m.coefficients() == if pole == 0.0 { 1 } else { 2 }, "{pole} {}", m.coefficients());
-            let mut w = vec![0.0; e.len()];
-            m.whiten(&e, &mut w);
-            let n = w.len() as f64;
-            let portmanteau: f64 = (1..=20)
-                .map(|lag| {
-                    let r: f64 = w[lag..].iter().zip(&w).map(|(a, b)| a * b).sum::<f64>() / norm2(&w);
-                    n * (n + 2.0) * r * r / (n - lag as f64)
-                })
-                .sum();
-            assert!(portmanteau < 45.3, "{portmanteau}");
-            assert!((norm2(&w) / n - 1.0).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn other_noise_is_not_taken_for_process_noise() {
-        let path = oscillator();
-        assert!(!NoiseModel::fit(&[&white(4000, 8)], 16, std::slice::from_ref(&path)).is_driven());
-        assert!(!NoiseModel::fit(&[&autoregressive(4000, 0.8, 9)], 16, &[path]).is_driven());
-    }
 }
