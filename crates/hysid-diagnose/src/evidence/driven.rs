@@ -200,7 +200,11 @@ mod tests {
         for (path, size, pole) in [(oscillator(), 20.0, 0.0), (integrator(), 30.0, 0.0), (oscillator(), 60.0, 0.9)] {
             let e = simulated(&path, &autoregressive(4000, pole, 1), size, 2);
             let m = NoiseModel::fit(&[&e], 16, std::slice::from_ref(&path));
-            assert!(m.is_driven() && m.coefficients() == if pole == 0.0 { 1 } else { 2 }, "{pole} {}", m.coefficients());
+            assert!(
+                m.is_driven() && m.coefficients() == if pole == 0.0 { 1 } else { 2 },
+                "{pole} {}",
+                m.coefficients()
+            );
             let mut w = vec![0.0; e.len()];
             m.whiten(&e, &mut w);
             let n = w.len() as f64;

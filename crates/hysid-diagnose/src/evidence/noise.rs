@@ -213,9 +213,9 @@ impl NoiseModel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evidence::norm2;
     use hysid_signal::inverse_fourier;
     use nalgebra::DMatrix;
-    use crate::evidence::norm2;
     use rand_distr::{Distribution, StandardNormal};
 
     fn white(n: usize, seed: u64) -> Vec<f64> {

@@ -298,5 +298,4 @@ mod tests {
             assert!((log - filter.log_scale(n)).abs() < 1e-6, "{log} {}", filter.log_scale(n));
         }
     }
-
 }
