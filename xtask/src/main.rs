@@ -29,6 +29,7 @@ enum Task {
     Layers,
     Prove(prove::Args),
     Recordings(recordings::Args),
+    Reliability(prove::reliability::Args),
     Reproduce(reproduce::Args),
 }
 
@@ -44,6 +45,7 @@ fn main() -> anyhow::Result<()> {
         Task::Ci(args) => ci::run(&args),
         Task::Prove(args) => prove::run(&args),
         Task::Recordings(args) => recordings::run(&args),
+        Task::Reliability(args) => prove::reliability::run(&args),
         Task::Reproduce(args) => reproduce::run(&args),
         Task::Layers => {
             let found = layers::breaches(&root())?;

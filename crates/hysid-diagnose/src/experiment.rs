@@ -2,7 +2,8 @@
 //!
 //! The distance is what remains after the rival's own refit, `min over theta_B of |y_A - y_B(theta_B)|^2 / sigma^2`: below 9 the recording
 //! cannot tell them apart, 25 settles it. Inputs come from a library of shapes, bands and levels; for a simulation with several inputs the
-//! recorded ones are scaled instead, since prescribed motions hang together.
+//! recorded ones are scaled instead, since prescribed motions hang together. An input louder than the recording is proposed only where no
+//! other promises ample separation: a machine has stops, and what two laws say far outside of what was recorded tells nothing of which is true.
 //!
 //! Reference: W. G. Hunter and A. M. Reiner, Designs for discriminating between two rival models, Technometrics 7 (1965) 307-323.
 
@@ -22,6 +23,14 @@ use crate::text::number;
 
 /// Below this two explanations cannot be told apart.
 pub const SAME: f64 = 9.0;
+/// From this on an experiment (or the recording itself) settles it.
+pub const SETTLED: f64 = 25.0;
+/// More is not better: a rival's own noise model takes part of its misfit for noise, so that four times what settles it is looked for.
+const AMPLE: f64 = 4.0 * SETTLED;
+/// Multiples of the recorded peak, in the order in which they are tried: the second row where the first has nothing ample.
+const LEVELS: [&[f64]; 2] = [&[1.0, 0.4], &[2.0]];
+/// The same where the recorded inputs themselves are scaled: their own level has been recorded already.
+const SCALES: [&[f64]; 2] = [&[0.6, 0.3], &[1.5, 2.0]];
 /// Iterations of the rival's refit.
 const ITERATIONS: usize = 5;
 /// Most samples of a tried experiment.
@@ -66,6 +75,20 @@ pub fn present_separation(setting: &Setting<'_>, winner: &Hypothesis<'_>, rival:
 /// The shape that stands for the recorded inputs themselves, scaled.
 const RECORDED: &str = "the recorded inputs";
 
+/// Steps of random height.
+const STEPS: &str = "steps";
+
+/// Steps as an amplifier makes them: within the band that the proposal states, and no sharper. Sharp ones would promise to part laws that
+/// differ at frequencies which no command carries.
+fn rounded(signal: &mut [f64], cycles_per_sample: f64) {
+    let share = 1.0 - (-std::f64::consts::TAU * cycles_per_sample).exp();
+    let mut value = 0.0;
+    for x in signal {
+        value += share * (*x - value);
+        *x = value;
+    }
+}
+
 /// An input of the library.
 struct Trial {
     shape: &'static str,
@@ -74,7 +97,8 @@ struct Trial {
     drive: Drive,
 }
 
-fn library(setting: &Setting<'_>, seed: u64) -> Vec<Trial> {
+/// The inputs of the library at row `row` of the levels.
+fn library(setting: &Setting<'_>, seed: u64, row: usize) -> Vec<Trial> {
     let Some(stretch) = setting.data.stretches.iter().max_by_key(|s| s.len()) else { return Vec::new() };
     let n = stretch.len().min(LONGEST);
     let period = setting.data.period_s;
@@ -90,7 +114,7 @@ fn library(setting: &Setting<'_>, seed: u64) -> Vec<Trial> {
         }
     };
     if inputs.len() > 1 || setting.original.is_static() {
-        for level in [0.3, 0.6, 1.5, 2.0] {
+        for &level in SCALES[row] {
             let scaled = inputs.iter().map(|c| c[..n].iter().map(|x| level * x).collect()).collect();
             offer(RECORDED, level, band, scaled);
         }
@@ -98,25 +122,36 @@ fn library(setting: &Setting<'_>, seed: u64) -> Vec<Trial> {
     }
     // A one-sided input keeps its mean: a tank is not filled by a negative flow.
     let one_sided = u.iter().all(|x| *x >= 0.0) && mean > 0.3 * peak;
+    let highest = if one_sided { mean / peak } else { f64::INFINITY };
     let nyquist = 0.5 / period;
     let (low, high) = (band.0.max(2.0 / (n as f64 * period)), band.1.min(0.4 * nyquist * 2.0));
     let middle = (low * high).sqrt();
-    let shapes: Vec<(&'static str, (f64, f64), Excitation)> = vec![
+    // Where lags and delays part; a sampled command carries no more.
+    let fast = (4.0 * high).min(0.2 / period);
+    let hold = ((1.0 / middle / period) as usize).clamp(2, (n / 8).max(2));
+    let mut shapes: Vec<(&'static str, (f64, f64), Excitation)> = vec![
         ("multisine", (low, high), Excitation::Multisine { lowest_hz: low, highest_hz: high, period: 0 }),
         ("low multisine", (low, middle), Excitation::Multisine { lowest_hz: low, highest_hz: middle, period: 0 }),
         ("high multisine", (middle, high), Excitation::Multisine { lowest_hz: middle, highest_hz: high, period: 0 }),
         ("chirp", (low, high), Excitation::Chirp { from_hz: low, to_hz: high }),
         ("triangle", (low, low), Excitation::Triangle { frequency_hz: low.max(3.0 / (n as f64 * period)) }),
-        ("steps", (low, high), Excitation::Steps { hold: ((0.25 / middle / period) as usize).clamp(2, n / 8) }),
+        (STEPS, (low, high), Excitation::Steps { hold }),
         ("growing sine", (low, high), Excitation::Sine { frequency_hz: middle }),
     ];
+    if fast > high {
+        let excitation = Excitation::Multisine { lowest_hz: high, highest_hz: fast, period: 0 };
+        shapes.push(("fast multisine", (high, fast), excitation));
+    }
     for (shape, range, excitation) in shapes {
         let Ok(mut signal) = excitation.signal(n, period, 1.0, seed) else { continue };
         if shape == "growing sine" {
             signal.iter_mut().enumerate().for_each(|(i, x)| *x *= i as f64 / n as f64);
         }
-        for level in [0.4, 2.0_f64] {
-            let level = if one_sided { level.min(mean / peak) } else { level };
+        if shape == STEPS {
+            rounded(&mut signal, high * period);
+        }
+        // A level that would come down to one of the first row has been tried.
+        for level in LEVELS[row].iter().filter(|_| row == 0 || highest > 1.0).map(|l| l.min(highest)) {
             offer(shape, level, range, vec![signal.iter().map(|x| mean + level * peak * x).collect()]);
         }
     }
@@ -152,7 +187,7 @@ fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) 
 
 /// The shape as it stands in a sentence.
 fn worded(shape: &str) -> String {
-    if shape == RECORDED || shape == "steps" { shape.to_owned() } else { format!("a {shape}") }
+    if shape == RECORDED || shape == STEPS { shape.to_owned() } else { format!("a {shape}") }
 }
 
 /// The experiment that would best separate two explanations.
@@ -165,13 +200,19 @@ pub fn propose(
 ) -> Option<ExperimentRecord> {
     let name = |h: &Hypothesis<'_>| h.effects.iter().map(|e| e.mechanism.id).collect::<Vec<_>>().join(" + ");
     let between = vec![name(a), name(b)];
-    let trials = library(setting, seed);
-    let found: Vec<Option<f64>> = trials.par_iter().map(|t| separation(setting, &a.base, &b.base, t)).collect();
-    let best = trials
-        .iter()
-        .zip(&found)
-        .filter_map(|(t, s)| s.filter(|s| s.is_finite()).map(|s| (t, s)))
-        .fold(None::<(&Trial, f64)>, |best, x| if best.is_none_or(|b| x.1 > b.1) { Some(x) } else { best });
+    let mut best: Option<(Trial, f64)> = None;
+    for row in 0..LEVELS.len() {
+        let trials = library(setting, seed, row);
+        let found: Vec<Option<f64>> = trials.par_iter().map(|t| separation(setting, &a.base, &b.base, t)).collect();
+        for (trial, s) in trials.into_iter().zip(found) {
+            if let Some(s) = s.filter(|s| s.is_finite() && best.as_ref().is_none_or(|b| *s > b.1)) {
+                best = Some((trial, s));
+            }
+        }
+        if best.as_ref().is_some_and(|b| b.1 >= AMPLE) {
+            break;
+        }
+    }
     let (trial, expected) = best?;
     let separable = expected >= SAME;
     let duration_s = trial.drive.len() as f64 * setting.data.period_s;
@@ -212,4 +253,25 @@ pub fn propose(
         present_separation: present,
         sensor,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounded_steps_are_the_steps_through_a_first_order_lag() {
+        let mut x = vec![1.0; 40];
+        rounded(&mut x, 0.05);
+        for (k, x) in x.iter().enumerate() {
+            let left = (-std::f64::consts::TAU * 0.05 * (k + 1) as f64).exp();
+            assert!((1.0 - x - left).abs() < 1e-12, "{k}: {x}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_louder_than_the_recording_in_the_first_row() {
+        assert!(LEVELS[0].iter().chain(SCALES[0]).all(|l| *l <= 1.0));
+        assert!(LEVELS[1].iter().chain(SCALES[1]).all(|l| *l > 1.0));
+    }
 }

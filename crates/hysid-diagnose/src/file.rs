@@ -126,6 +126,10 @@ pub struct EffectRecord {
     pub probability: f64,
     /// Probability that it is this family.
     pub family_probability: f64,
+    /// Share of the tempered evidence that is for this mechanism, less what rules take: decides what is firm (see [`crate::reliability`]).
+    pub support: f64,
+    /// The same for the family.
+    pub family_support: f64,
     /// Share of its response that the simulation's own parameters could absorb.
     pub concealment: Option<f64>,
     /// For people.

@@ -7,6 +7,7 @@ mod locate;
 pub mod mechanism;
 pub mod picture;
 pub mod refit;
+pub mod reliability;
 pub mod slot;
 pub mod verdict;
 

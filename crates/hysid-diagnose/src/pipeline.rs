@@ -18,6 +18,7 @@ use crate::hypothesis::Setting;
 use crate::left::Left;
 use crate::picture::Picture;
 use crate::records::*;
+use crate::reliability::recalibrate;
 use crate::report_values::{reported, sentence};
 use crate::screen::screen;
 use crate::search::{Search, calibrate, words};
@@ -261,6 +262,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
                 slot: e.slot.label.clone(),
                 probability: s.mechanism,
                 family_probability: s.family,
+                support: s.mechanism,
+                family_support: s.family,
                 concealment: e.concealment,
                 sentence: sentence(e, &parameters),
                 parameters,
@@ -288,14 +291,14 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if vetoed {
         file.verdict = VerdictKind::Ambiguous;
         for e in &mut file.effects {
-            e.probability = e.probability.min(NOT_FIRM);
-            e.family_probability = e.family_probability.min(NOT_FIRM);
+            e.support = e.support.min(NOT_FIRM);
+            e.family_support = e.family_support.min(NOT_FIRM);
         }
         file.notes.push("the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to, and no augmented simulation is written".into());
     }
     if significant && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous) && !(hooks.expired)(1.0) {
         (hooks.progress)("looking for an experiment");
-        file.experiment = rival_of(&pool, &weighed, winner).and_then(|rival| {
+        for rival in rivals_of(&pool, &weighed, &probability, winner) {
             let present = present_separation(setting, best, &pool[rival]);
             if let Some(d) = present {
                 for e in &pool[rival].effects {
@@ -306,8 +309,19 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
                     }
                 }
             }
-            propose(setting, best, &pool[rival], present, options.seed)
-        });
+            if settled(probability[winner], probability[rival], present) {
+                continue;
+            }
+            let proposed = propose(setting, best, &pool[rival], present, options.seed);
+            let separable = proposed.as_ref().is_some_and(|p| p.separable);
+            if separable || file.experiment.is_none() {
+                file.experiment = proposed;
+            }
+            // Where the first cannot be told from the winner by any input, the second may be worth an experiment.
+            if separable || (hooks.expired)(1.0) {
+                break;
+            }
+        }
     }
     if winner > 0 {
         file.remaining = Some(left.record(&pool, winner));
@@ -323,6 +337,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     }
     let written = winner > 0 && !vetoed && !left.foreign;
     file.correction = left.believed();
+
+    recalibrate(&mut file);
 
     (hooks.progress)("scoring on the hold-out");
     let augmented = written.then(|| best.base.document());

@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use crate::base::Base;
 use crate::compose::best_of;
+use crate::experiment::SETTLED;
 use crate::hypothesis::{Effect, Hypothesis, Setting, block_score};
-use crate::verdict::{Claim, Hypothesis as Weighed};
+use crate::verdict::{Claim, FIRM, Hypothesis as Weighed};
 
 /// Weight of the log evidence in the probabilities.
 pub const EVIDENCE_WEIGHT: f64 = 0.4;
@@ -29,12 +30,23 @@ pub fn weigh(h: &Hypothesis<'_>) -> Weighed {
     }
 }
 
-/// The likeliest set that names another mechanism than the winner.
-pub fn rival_of(pool: &[Hypothesis<'_>], weighed: &[Weighed], winner: usize) -> Option<usize> {
-    let names = |i: usize, id: &str| pool[i].effects.iter().any(|e| e.mechanism.id == id);
-    (0..pool.len())
-        .filter(|&i| pool[i].effects.iter().any(|e| !names(winner, e.mechanism.id)))
-        .max_by(|&a, &b| weighed[a].log_evidence.total_cmp(&weighed[b].log_evidence))
+/// Sets that contradict the winner, one by evidence and one by probability: each names a mechanism that the other does not (a set with more or
+/// fewer members than the winner says the same of those that they share). Two, since one of them is often the winner's law in other words.
+pub fn rivals_of(pool: &[Hypothesis<'_>], weighed: &[Weighed], probability: &[f64], winner: usize) -> Vec<usize> {
+    let lacks = |i: usize, j: usize| {
+        pool[i].effects.iter().any(|e| pool[j].effects.iter().all(|other| other.mechanism.id != e.mechanism.id))
+    };
+    let rivals = || (0..pool.len()).filter(|&i| lacks(i, winner) && lacks(winner, i));
+    let by_evidence = rivals().max_by(|&a, &b| weighed[a].log_evidence.total_cmp(&weighed[b].log_evidence));
+    let likeliest =
+        rivals().max_by(|&a, &b| probability[a].total_cmp(&probability[b])).filter(|r| Some(*r) != by_evidence);
+    by_evidence.into_iter().chain(likeliest).collect()
+}
+
+/// Whether the recording has settled the matter between two sets: what it makes of them is far apart, and the odds are firm. What keeps such
+/// a verdict from being firm is something else, and no experiment between the two is needed.
+pub fn settled(winner: f64, rival: f64, separation: Option<f64>) -> bool {
+    separation.is_some_and(|s| s >= SETTLED) && winner >= FIRM * (winner + rival)
 }
 
 /// Scores on held-out blocks of the hypotheses that are close to the best; `None` for the others.

@@ -15,6 +15,8 @@ fn file(verdict: VerdictKind) -> DiagnosisFile {
         slot: "state:v".into(),
         probability: 0.97,
         family_probability: 0.99,
+        support: 0.97,
+        family_support: 0.99,
         concealment: Some(0.93),
         sentence: "Dry friction of about 20 N opposes the motion.".into(),
         parameters: vec![ParameterRecord {

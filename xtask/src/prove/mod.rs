@@ -12,6 +12,7 @@ mod experiment;
 mod guard;
 mod linear;
 mod page;
+pub mod reliability;
 mod rivals;
 mod score;
 mod sindy;
@@ -59,6 +60,9 @@ pub struct Args {
     /// Only the controls among the cases, where nothing is missing: false alarms in all and for each kind of noise; docs/proof.md is left alone
     #[arg(long, conflicts_with_all = ["quick", "write"])]
     controls: bool,
+    /// Print how often statements of a given probability are right, and write them to statements.csv, for `cargo xtask reliability`
+    #[arg(long, requires = "development")]
+    reliability: bool,
     /// Only write the bank below this directory: cases/, and labels.json beside it
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
@@ -127,6 +131,10 @@ fn whole(bench: &Bench, bank: &Bank, args: &Args, start: Instant) -> anyhow::Res
     std::fs::write(out.join("cases.txt"), page::cases(&rows))?;
     let labels: Vec<_> = rows.iter().map(|r| &r.label).collect();
     std::fs::write(out.join("labels.json"), serde_json::to_string_pretty(&labels)?)?;
+    if args.reliability {
+        println!("{}", reliability::table(&rows)?);
+        std::fs::write(out.join("statements.csv"), reliability::file(&rows))?;
+    }
     println!("page, cases and labels: {}", out.display());
     if bank.stream == Stream::Reporting {
         page::record(&crate::root().join("docs/proof.md"), &text, &score, &command, took)?;

@@ -16,6 +16,8 @@ pub struct Stated {
     pub probability: f64,
     /// Probability of the family (that of the mechanism where it is not given).
     pub family_probability: f64,
+    /// Support of mechanism and family before recalibration (the probabilities where it is not given).
+    pub support: (f64, f64),
     /// Name, value, low and high end of each parameter.
     pub parameters: Vec<(String, f64, f64, f64)>,
 }
@@ -27,6 +29,8 @@ pub struct Alternative {
     pub mechanism: String,
     /// Family.
     pub family: String,
+    /// Its probability.
+    pub probability: f64,
     /// Separation from the likeliest set.
     pub separation: Option<f64>,
 }
@@ -63,6 +67,8 @@ pub struct Experiment {
     pub band: [f64; 2],
     /// Expected squared distance in units of the noise.
     pub separation: f64,
+    /// The mechanisms that it is to tell apart.
+    pub between: Vec<String>,
 }
 
 impl Verdict {
@@ -76,6 +82,7 @@ impl Verdict {
             .map(|a| Alternative {
                 mechanism: word(&a["mechanism"]),
                 family: word(&a["family"]),
+                probability: a["probability"].as_f64().unwrap_or(0.0),
                 separation: a["separation"].as_f64(),
             })
             .collect();
@@ -98,6 +105,7 @@ impl Verdict {
             level: e["level"].as_f64().unwrap_or(1.0),
             band: [e["band_hz"][0].as_f64().unwrap_or(0.0), e["band_hz"][1].as_f64().unwrap_or(0.0)],
             separation: e["expected_separation"].as_f64().unwrap_or(0.0),
+            between: list(&e["between"]).iter().flat_map(|set| names(&word(set))).collect(),
         });
         Ok(Self {
             kind,
@@ -137,14 +145,24 @@ fn word(v: &Value) -> String {
     v.as_str().unwrap_or_default().to_string()
 }
 
+/// The mechanisms of a set that is written as a sum.
+fn names(set: &str) -> Vec<String> {
+    set.split(" + ").map(str::to_owned).collect()
+}
+
 fn stated(v: &Value) -> Stated {
     let probability = v["probability"].as_f64().unwrap_or(0.0);
+    let family_probability = v["family_probability"].as_f64().unwrap_or(probability).max(probability);
     Stated {
         mechanism: word(&v["mechanism"]),
         family: word(&v["family"]),
         slot: word(&v["slot"]),
         probability,
-        family_probability: v["family_probability"].as_f64().unwrap_or(probability).max(probability),
+        family_probability,
+        support: (
+            v["support"].as_f64().unwrap_or(probability),
+            v["family_support"].as_f64().unwrap_or(family_probability),
+        ),
         parameters: list(&v["parameters"])
             .iter()
             .map(|p| {

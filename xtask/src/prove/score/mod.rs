@@ -10,6 +10,7 @@ mod tests;
 
 pub use line::{Line, Standing};
 pub use row::Row;
+pub use statements::{Statement, statements};
 
 use std::collections::BTreeMap;
 
@@ -20,7 +21,8 @@ use self::breakdown::{cell, competitors, confusion};
 use self::line::{figure, plain, share, told};
 use self::numbers::{jump, parameters};
 use self::row::over_oracle;
-use self::statements::{Statement, firm_and_wrong, statements};
+use self::statements::firm_and_wrong;
+use super::experiment::Settled;
 use super::stats::{Bin, calibration};
 use super::verdict::Verdict;
 
@@ -250,8 +252,8 @@ pub fn score(rows: &[Row]) -> Score {
     }
     lines.push(line);
 
-    let settled: Vec<bool> = rows.iter().filter_map(|r| r.settled).collect();
-    let hits = settled.iter().filter(|s| **s).count();
+    let settled: Vec<Settled> = rows.iter().filter_map(|r| r.settled).collect();
+    let hits = settled.iter().filter(|s| s.proposed).count();
     lines.push(share(
         "Proposed experiment (separation >= 25) settles the tie",
         ">= 80 %",
@@ -261,6 +263,8 @@ pub fn score(rows: &[Row]) -> Score {
         false,
         false,
     ));
+    let by_chance = settled.iter().filter(|s| s.random).count();
+    lines.push(told("- an input drawn at random, of the same length and level", by_chance, settled.len()));
     let louder: Vec<bool> =
         known.iter().filter_map(|r| Some(r.trial.after_louder? <= 0.5 * r.rivals.best_black_box_louder()?)).collect();
     let hits = louder.iter().filter(|s| **s).count();

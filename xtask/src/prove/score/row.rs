@@ -2,6 +2,7 @@
 
 use hysid_concealed::case::{Case, Concealed, Group, Label};
 
+use super::super::experiment::Settled;
 use super::super::rivals::Rivals;
 use super::super::trial::Trial;
 use super::super::verdict::{Stated, Verdict};
@@ -16,7 +17,7 @@ pub struct Row {
     /// Competitors.
     pub rivals: Rivals,
     /// Whether the proposed experiment settled the tie, where one was proposed with enough separation.
-    pub settled: Option<bool>,
+    pub settled: Option<Settled>,
 }
 
 impl Row {
@@ -48,6 +49,20 @@ impl Row {
         let guess = self.guess();
         guess.len() == self.label.effects.len()
             && self.label.effects.iter().all(|e| guess.iter().any(|g| mechanism_fits(e, g)))
+    }
+
+    /// Whether a tie between these mechanisms is resolved, and correctly: the guess is right, and whatever of the tie is wrong has odds of at
+    /// most 1 to 9 against it, which is what makes a statement firm. That a verdict is `named` would ask for more: that no rule keeps the
+    /// member from being firm, and that no third mechanism, between which nobody was asked to decide, ties with it.
+    pub fn resolves(&self, tie: &[String]) -> bool {
+        let Some(v) = self.verdict() else { return false };
+        let right = |name: &str| self.label.effects.iter().any(|e| is(e, name));
+        let least = v.effects.iter().map(|e| e.probability).fold(1.0, f64::min);
+        let refuted = |name: &str| {
+            let list = v.alternatives.iter().filter(|a| a.mechanism == name);
+            9.0 * list.map(|a| a.probability).fold(0.0, f64::max) <= least
+        };
+        self.mechanisms_right() && tie.iter().all(|name| right(name) || refuted(name))
     }
 
     /// Whether every true mechanism is guessed or is a rival that this record cannot separate from the guess.
