@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
 use hysid_diagnose::reliability::{FAMILY, IMITATION, MECHANISM, Map, logit};
-use hysid_diagnose::verdict::{FIRM, NOT_FIRM};
+use hysid_diagnose::verdict::FIRM;
 
 use super::score::{Row, Statement, statements};
 use super::stats::calibration;
@@ -242,6 +242,7 @@ fn fit(list: &[Observation], level: usize) -> Map {
 mod tests {
     use super::*;
     use hysid_concealed::seed::{Random, Stream};
+    use hysid_diagnose::verdict::NOT_FIRM;
 
     #[test]
     fn the_engine_has_what_the_stored_statements_give() {
