@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::budget::Step;
 use crate::fitting::{HOPELESS, Part, assemble, complete, refit_all, without};
 use crate::hypothesis::{Effect, Hypothesis, Key, Setting};
 use crate::joint::pairs;
@@ -89,8 +90,6 @@ pub struct Ask<'a, 'd> {
     pub unexplained: &'a dyn Fn(&Hypothesis<'d>) -> bool,
     /// What could be missing around a hypothesis.
     pub around: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
-    /// Whether time is up.
-    pub enough: &'a dyn Fn() -> bool,
 }
 
 /// Log evidence that another effect must add.
@@ -110,9 +109,15 @@ pub fn superposed<'d>(
 ) -> Vec<Hypothesis<'d>> {
     let (_, r) = none.base.evidence();
     let own = none.base.values();
+    if setting.budget.omits(Step::Fits) {
+        return Vec::new();
+    }
     let mut sketched: Vec<Hypothesis<'d>> = pairs(candidates, &r, PAIRS.0)
         .par_iter()
         .filter_map(|pair| {
+            if setting.budget.omits(Step::Fits) {
+                return None;
+            }
             let parts =
                 [0, 1].map(|i| Part::of_candidate(&candidates[pair.members[i]], pair.points[i], &pair.amplitudes[i]));
             assemble(setting, none, &own, &parts, 5)
@@ -120,7 +125,8 @@ pub fn superposed<'d>(
         .collect();
     sketched.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     let rest = sketched.split_off(PAIRS.1.min(sketched.len()).min(most));
-    let mut out: Vec<Hypothesis<'d>> = sketched.into_par_iter().map(|h| complete(setting, h)).collect();
+    let to_the_end = |h| if setting.budget.omits(Step::Fits) { h } else { complete(setting, h) };
+    let mut out: Vec<Hypothesis<'d>> = sketched.into_par_iter().map(to_the_end).collect();
     out.extend(rest);
     out
 }
@@ -136,7 +142,8 @@ pub fn compose<'d>(
     options: SearchOptions,
     ask: &Ask<'_, 'd>,
 ) {
-    let Ask { unexplained, around, enough } = ask;
+    let Ask { unexplained, around } = ask;
+    let enough = || setting.budget.omits(Step::Composition);
     for depth in 2..=options.depth {
         if enough() {
             return;

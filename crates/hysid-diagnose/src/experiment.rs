@@ -12,6 +12,7 @@ use hysid_signal::Excitation;
 use rayon::prelude::*;
 
 use crate::base::Base;
+use crate::budget::Step;
 use crate::data::DataSet;
 use crate::evidence::{Whitener, norm2};
 use crate::file::ExperimentRecord;
@@ -200,10 +201,15 @@ pub fn propose(
 ) -> Option<ExperimentRecord> {
     let name = |h: &Hypothesis<'_>| h.effects.iter().map(|e| e.mechanism.id).collect::<Vec<_>>().join(" + ");
     let between = vec![name(a), name(b)];
+    let tried = |t: &Trial| {
+        let late = setting.budget.omits(Step::Experiment);
+        (!late).then(|| separation(setting, &a.base, &b.base, t))
+    };
     let mut best: Option<(Trial, f64)> = None;
     for row in 0..LEVELS.len() {
         let trials = library(setting, seed, row);
-        let found: Vec<Option<f64>> = trials.par_iter().map(|t| separation(setting, &a.base, &b.base, t)).collect();
+        // A part of the library cannot say which input is the best, nor that none would do.
+        let found: Vec<Option<f64>> = trials.par_iter().map(tried).collect::<Option<_>>()?;
         for (trial, s) in trials.into_iter().zip(found) {
             if let Some(s) = s.filter(|s| s.is_finite() && best.as_ref().is_none_or(|b| *s > b.1)) {
                 best = Some((trial, s));

@@ -8,8 +8,6 @@ use crate::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights};
 /// law looks like a small one.
 const TRIFLE: f64 = 0.02;
 
-/// Laws that are the sum of two others: friction that is unequal in the two directions is dry friction and a constant force, sticking included.
-const SUMS: &[&str] = &["asymmetric_friction"];
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
 
@@ -46,7 +44,7 @@ pub fn firmness(
         if doubtful || twice || vague {
             s.weaken();
         }
-        if bounded(&best.base, e) || e.mechanism.family.members_imitate() || SUMS.contains(&e.mechanism.id) {
+        if bounded(&best.base, e) || e.mechanism.family.members_imitate() || e.written.sum_of_others {
             s.mechanism = s.mechanism.min(NOT_FIRM);
         }
     }
@@ -55,9 +53,7 @@ pub fn firmness(
 
 /// Whether a member of a set adds next to nothing beside what the others explain, where the set without it was fitted.
 fn trifle(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
-    let mut rest = pool[winner].key();
-    let e = &pool[winner].effects[member];
-    rest.retain(|(id, slot)| !(*id == e.mechanism.id && *slot == e.slot.label));
+    let rest = pool[winner].key_without(member);
     let whole = pool[winner].log_evidence - pool[0].log_evidence;
     !rest.is_empty()
         && pool.iter().any(|h| h.key() == rest && pool[winner].log_evidence - h.log_evidence < TRIFLE * whole)
@@ -67,18 +63,12 @@ fn trifle(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
 /// it less likely, but refutes nothing: what is named firmly must be what the recording demands.
 fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let best = &pool[winner];
-    let others = |h: &Hypothesis<'_>, family| {
-        let mut rest = h.key();
-        let place = h.effects.iter().position(|e| e.mechanism.family == family)?;
-        let id = h.effects[place].mechanism.id;
-        rest.retain(|(name, _)| *name != id);
-        Some(rest)
-    };
     let Some(twin) = best.effects[member].mechanism.family.twin() else { return false };
-    let rest = others(best, best.effects[member].mechanism.family);
+    let rest = best.key_without(member);
     pool.iter().any(|h| {
+        let of_twin = h.effects.iter().position(|e| e.mechanism.family == twin);
         h.effects.len() == best.effects.len()
-            && others(h, twin) == rest
+            && of_twin.is_some_and(|place| h.key_without(place) == rest)
             && h.base.log_likelihood > best.base.log_likelihood - REFUTED
     })
 }

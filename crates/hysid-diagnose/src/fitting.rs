@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use crate::base::Base;
+use crate::budget::Step;
 use crate::calibrate::calibrated_copy;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::Mechanism;
@@ -88,7 +89,7 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
         }
         let own = with(&own, best);
         // A law with amplitudes begins beside the simulation as it is; one without them is there or not, and may stand far from it.
-        if candidate.refit.amplitudes.is_empty() && parent.base.far() {
+        if candidate.refit.amplitudes.is_empty() && parent.base.far() && !setting.budget.omits(Step::Fits) {
             let mut document = document.clone();
             for p in &mut document.parameters {
                 p.value = own.parameters.get(&p.name).copied().unwrap_or(p.value);
@@ -120,6 +121,9 @@ fn refit_from<'d>(
     let document = &candidate.refit.simulation;
     let mut best: Option<Base<'d>> = begun;
     for (i, from) in froms.into_iter().enumerate() {
+        if best.is_some() && setting.budget.omits(Step::Fits) {
+            break;
+        }
         // Another start must come near the best in a few iterations to be followed.
         let brief = if i == 0 { setting.iterations } else { 5 };
         let fitted = match &best {
@@ -144,6 +148,9 @@ fn refit_from<'d>(
 fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
     for index in from..h.effects.len() {
         profile_shapes(setting, h, index);
+    }
+    if setting.budget.omits(Step::Fits) {
+        return;
     }
     let polished = setting.further(&h.base, Some(&h.base.whitener), 1, setting.iterations);
     if let Some(p) = polished
@@ -177,7 +184,7 @@ fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usiz
     let whole = h.base.model.simulation().clone();
     let effect = h.effects[index].clone();
     for shape in &effect.written.shapes {
-        if !crate::screen::needs_profile(effect.mechanism.id, &shape.name) || shape.grid.len() < 3 {
+        if !shape.searched || shape.grid.len() < 3 {
             continue;
         }
         let mut document = whole.clone();
@@ -189,6 +196,9 @@ fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usiz
         let mut step = 0.5 * spacing;
         let mut moved = false;
         for _ in 0..6 {
+            if setting.budget.omits(Step::Fits) {
+                break;
+            }
             let x = here(&h.base);
             let trials: Vec<Option<Base<'d>>> = [x - step, x + step]
                 .into_par_iter()
@@ -237,11 +247,16 @@ pub const HOPELESS: f64 = 40.0;
 
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
 ///
-/// A few iterations from the best start tell who is hopeless; the others are refitted to the end, from all their starts.
+/// A few iterations from the best start tell who is hopeless; the others are refitted to the end, from all their starts. The first is
+/// always begun, however little time there is.
 pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Candidate]) -> Vec<Hypothesis<'d>> {
     let first: Vec<(Vec<Values>, Option<Hypothesis<'d>>)> = list
         .par_iter()
-        .map(|c| {
+        .enumerate()
+        .map(|(i, c)| {
+            if i > 0 && setting.budget.omits(Step::Fits) {
+                return (Vec::new(), None);
+            }
             let froms = starting_values(setting, parent, c);
             let sketched = sketch(setting, parent, c, &froms).map(|base| hypothesis(setting, parent, c, base));
             (froms, sketched)
@@ -258,6 +273,7 @@ pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Ca
         .zip(first)
         .filter_map(|(c, (froms, sketched))| match sketched {
             Some(h) if h.log_evidence < threshold => Some(h),
+            sketched if setting.budget.omits(Step::Fits) => sketched,
             sketched => refit_from(setting, parent, c, froms, sketched.map(|h| h.base)),
         })
         .collect();

@@ -6,6 +6,7 @@
 use hysid_plant::Simulation;
 
 use crate::base::{Base, NoiseKind, Start, fit_simulation};
+use crate::budget::Budget;
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Rewritten};
@@ -43,7 +44,13 @@ pub type Key = Vec<(&'static str, String)>;
 impl Hypothesis<'_> {
     /// The statement that it makes.
     pub fn key(&self) -> Key {
-        let mut key: Key = self.effects.iter().map(|e| (e.mechanism.id, e.slot.label.clone())).collect();
+        self.key_without(usize::MAX)
+    }
+
+    /// The statement without this one of its effects.
+    pub fn key_without(&self, member: usize) -> Key {
+        let others = self.effects.iter().enumerate().filter(|(i, _)| *i != member);
+        let mut key: Key = others.map(|(_, e)| (e.mechanism.id, e.slot.label.clone())).collect();
         key.sort();
         key
     }
@@ -87,6 +94,8 @@ pub struct Setting<'d> {
     pub iterations: usize,
     /// How noise is modelled.
     pub noise: NoiseKind,
+    /// The time that the search may take.
+    pub budget: &'d Budget<'d>,
 }
 
 impl<'d> Setting<'d> {

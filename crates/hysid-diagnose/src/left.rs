@@ -1,6 +1,7 @@
 //! What is left of the winning set's residual: whether something significant is, whether generic terms find it, and whether the set is then only
 //! an imitation of a law that the catalogue does not have.
 
+use crate::budget::Step;
 use crate::evidence::SurrogateTest;
 use crate::file::finite;
 use crate::file::{CorrectionRecord, RemainingRecord};
@@ -20,7 +21,7 @@ const FAR_MORE: f64 = 5.0;
 
 /// What is left of a set's residual.
 pub struct Left {
-    /// The surrogate test of the residual; `None` where the set is empty.
+    /// The surrogate test of the residual; `None` where the set is empty or there was no time.
     test: Option<SurrogateTest>,
     /// Generic terms for the residual; `None` where no mismatch is significant or no term is chosen.
     open: Option<OpenSet>,
@@ -36,7 +37,8 @@ impl Left {
     pub fn of(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize, significant: bool) -> Self {
         let (best, none) = (&pool[winner], &pool[0]);
         let alpha = search.options.alpha;
-        let test = (winner > 0).then(|| search.remains(best));
+        let budget = search.setting.budget;
+        let test = (winner > 0 && !budget.omits(Step::Remains)).then(|| search.remains(best));
         let open = if significant { search.open(best) } else { None };
         let seen = open.as_ref().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
         let explained = best.log_evidence - none.log_evidence;
@@ -45,17 +47,19 @@ impl Left {
             open.is_some_and(|o| o.gain > explained + FAR_MORE)
         };
         let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || alone());
-        let imperfect = winner > 0 && (foreign || seen.is_some() || test.as_ref().is_some_and(|t| t.p_value < alpha));
+        // What was not looked at is not known to be nothing.
+        let significant = |t: &SurrogateTest| t.p_value < alpha;
+        let imperfect = winner > 0 && (foreign || seen.is_some() || test.as_ref().is_none_or(significant));
         Self { test, open, foreign, imperfect, alpha }
     }
 
-    /// As it is reported.
-    pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> RemainingRecord {
-        let p = self.test.as_ref().map_or(1.0, |t| t.p_value);
-        RemainingRecord {
+    /// As it is reported; `None` where it was not looked at.
+    pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> Option<RemainingRecord> {
+        let p = self.test.as_ref()?.p_value;
+        Some(RemainingRecord {
             p_value: p.min(self.open.as_ref().map_or(1.0, |o| unlikely(o, ODDS_AGAINST_MORE))),
             share: share(&pool[winner], &pool[0]),
-        }
+        })
     }
 
     /// Whether the mismatch is none of the catalogue: no set stands and a correction does, the set is an imitation, or most of the mismatch

@@ -13,6 +13,7 @@ pub mod verdict;
 
 mod base;
 mod bootstrap;
+mod budget;
 mod calibrate;
 mod column;
 mod compose;
@@ -47,4 +48,4 @@ pub use data::{DataSet, Stretch, held_out_blocks};
 pub use error::DiagnoseError;
 pub use model::{Model, Outputs, Unknown, Values};
 
-pub use pipeline::{COMPOSING, Diagnosis, Hooks, Options, Question, Request, diagnose};
+pub use pipeline::{Diagnosis, Hooks, Options, Question, Request, diagnose};

@@ -1,5 +1,6 @@
 //! Is it the simulation's own numerics? Variants of step, hold, clock and smoothing, fitted like any other explanation.
 
+use crate::budget::Step;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::Rewritten;
 use crate::mechanism::numerics::{SOLVER_ARTEFACT, variants};
@@ -15,6 +16,9 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
     let mut best: Option<Hypothesis<'d>> = None;
     for variant in variants(&none.base.document(), setting.data.period_s) {
         let Some(first) = variant.simulation else { continue };
+        if setting.budget.omits(Step::Numerics) {
+            break;
+        }
         let mut document = first;
         for round in 0..AGAIN {
             let Some(base) = setting.fit(&document, &none.base.values(), Some(&none.base.whitener), 2, 12) else {
@@ -35,6 +39,7 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
                 linear: false,
                 report: Vec::new(),
                 states: Vec::new(),
+                sum_of_others: false,
             };
             let effect = Effect { mechanism: &SOLVER_ARTEFACT, slot, written, concealment: None };
             best = Some(Hypothesis { effects: vec![effect], base, log_evidence: evidence });

@@ -4,6 +4,7 @@ use hysid_plant::Simulation;
 use hysid_signal::Recording;
 
 use crate::base::NoiseKind;
+use crate::budget::{Budget, Step};
 use crate::compose::{add, best_of};
 use crate::data::{DataSet, held_out_blocks};
 use crate::draw::{Sitting, picture};
@@ -23,7 +24,7 @@ use crate::report_values::{reported, sentence};
 use crate::screen::screen;
 use crate::search::{Search, calibrate, words};
 use crate::second_look::{ODDS_AGAINST, unlikely};
-use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, verdict};
+use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, verdict};
 use crate::weigh::*;
 
 /// Options of a diagnosis.
@@ -87,8 +88,6 @@ pub struct Diagnosis {
 /// Most samples that the search works on where the outputs are thinned, and where they are not; a longer recording is used in windows.
 const MOST_SAMPLES: usize = 26_000;
 const MOST_ROWS: usize = 12_000;
-/// Share of the time after which no further effects are looked for: what was found must still be judged.
-pub const COMPOSING: f64 = 0.6;
 
 /// Diagnoses a simulation.
 ///
@@ -129,6 +128,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("calibrating the simulation");
     let own_states: Vec<String> = simulation.states.iter().map(|s| s.name.clone()).collect();
+    let budget = Budget::new(hooks.expired);
     let mut setting = Setting {
         data: &data,
         original: simulation.clone(),
@@ -138,6 +138,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         own_unknowns: 0,
         iterations: 12,
         noise: NoiseKind::Coloured,
+        budget: &budget,
     };
     let base = calibrate(&mut setting, request)?;
     (hooks.accepted)();
@@ -178,7 +179,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(&plain, options, hooks);
     let murky = none.base.gross() || none.base.far();
-    let plain_start = if murky || none.base.coloured() { plainly.start(&none) } else { None };
+    let heard = murky || (none.base.coloured() && !budget.omits(Step::OtherNoise));
+    let plain_start = if heard { plainly.start(&none) } else { None };
     let mut significant = test.p_value < options.alpha;
     let mut pool = Vec::new();
     // A coloured noise model takes part of a mismatch for noise: what plain squares would find is heard too.
@@ -187,7 +189,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         pool = search.under_noise(&none, &plainly.glance(start, found));
     }
     let mut gross = plain_start.filter(|_| murky);
-    if !significant && !(hooks.expired)(COMPOSING) {
+    if !significant {
         (hooks.progress)("taking a second look");
         let seen = match &gross {
             Some((start, found)) => plainly.on_blocks(start, &plainly.glance(start, found)),
@@ -243,11 +245,15 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("weighing the evidence");
     let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
-    let blocks = block_scores(setting, &pool, hooks.expired);
+    let blocks = block_scores(setting, &pool);
     let winner = if significant { tie_broken(&pool, &blocks) } else { 0 };
     let left = Left::of(&search, &pool, winner, significant);
     let probability = likelihoods(&pool, &weighed, &blocks, winner, left.imperfect);
-    let support = firmness(&pool, &weighed, &probability, winner, left.imperfect);
+    let mut support = firmness(&pool, &weighed, &probability, winner, left.imperfect);
+    // A search that was cut short has not heard all rivals.
+    if budget.unfinished() {
+        support.iter_mut().for_each(Support::weaken);
+    }
     file.verdict = verdict(&support);
     let best = &pool[winner];
     file.effects = best
@@ -296,7 +302,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         }
         file.notes.push("the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to, and no augmented simulation is written".into());
     }
-    if significant && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous) && !(hooks.expired)(1.0) {
+    if significant
+        && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous)
+        && !budget.omits(Step::Experiment)
+    {
         (hooks.progress)("looking for an experiment");
         for rival in rivals_of(&pool, &weighed, &probability, winner) {
             let present = present_separation(setting, best, &pool[rival]);
@@ -323,16 +332,16 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             }
         }
     }
-    if winner > 0 {
-        file.remaining = Some(left.record(&pool, winner));
-    }
-    if left.is_outside(&support, file.remaining.as_ref()) {
+    file.remaining = left.record(&pool, winner);
+    if left.is_outside(&support, file.remaining.as_ref()) && !budget.unfinished() {
         file.verdict = VerdictKind::NotInCatalogue;
     }
     if significant && file.verdict == VerdictKind::NoSignificantMismatch {
         file.notes.push("simulation and recording differ by more than the surrogates do, but no effect and no generic term explains it: nothing is claimed".into());
     }
-    if left.foreign && !vetoed {
+    if left.foreign && !vetoed && budget.unfinished() {
+        file.notes.push("generic terms explain far more than the effects that were fitted in time; no augmented simulation is written".into());
+    } else if left.foreign && !vetoed {
         file.notes.push("the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input".into());
     }
     let written = winner > 0 && !vetoed && !left.foreign;
@@ -355,6 +364,14 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         }
     }
     file.summary = summary(&file);
+    if let Some(note) = budget.note() {
+        if budget.unfinished() && file.verdict == VerdictKind::NoSignificantMismatch {
+            file.summary =
+                "The search was cut short by the time limit; what was done of it shows no mismatch that it could name."
+                    .into();
+        }
+        file.notes.push(note);
+    }
     let noise: Vec<f64> = simulation.outputs.iter().map(|o| file.mismatch.noise_rms[&o.column]).collect();
     let picture = picture(&Sitting {
         simulation,

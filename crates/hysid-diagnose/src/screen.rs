@@ -301,21 +301,6 @@ pub fn with_added_starts(values: &Values, effect: &Rewritten, slot: &Slot, stret
     out
 }
 
-/// Whether least squares alone cannot move this shape: a time of change, a period, a knee that few samples reach.
-pub fn needs_profile(mechanism: &str, shape: &str) -> bool {
-    let shape = shape.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('_');
-    matches!(
-        (mechanism, shape),
-        ("abrupt_change", _)
-            | ("cogging", "p_x")
-            | ("periodic_disturbance", _)
-            | ("gap_stop", _)
-            | ("bilinear_stiffness", _)
-            | ("overflow", _)
-            | ("input_saturation" | "output_saturation", _)
-    )
-}
-
 /// A mechanism written into a document at the slot of that label, scaled by the signals of a calibrated simulation.
 pub fn rewrite_at(
     base: &Base<'_>,

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::base::Base;
+use crate::budget::Step;
 use crate::compose::{Ask, SearchOptions, add, compose, short_list, unheard};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
@@ -14,7 +15,7 @@ use crate::hypothesis::{Hypothesis, Key, Setting};
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
 use crate::openset::{OpenSet, correction};
-use crate::pipeline::{COMPOSING, Hooks, Options, Question, Request};
+use crate::pipeline::{Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
 use crate::second_look::{ODDS_AGAINST_MORE, unlikely};
 use crate::slot::Slot;
@@ -112,7 +113,7 @@ impl<'a, 'd> Search<'a, 'd> {
         let mut given: Vec<Key> = Vec::new();
         for _ in 0..HEARINGS {
             let list = unheard(pool, candidates, &given);
-            if list.is_empty() || (self.hooks.expired)(COMPOSING) {
+            if list.is_empty() || self.setting.budget.omits(Step::Rivals) {
                 break;
             }
             given.extend(list.iter().map(|c| c.key()));
@@ -120,7 +121,9 @@ impl<'a, 'd> Search<'a, 'd> {
                 add(pool, h);
             }
         }
-        if let Some(h) = crate::numerics_check::artefact(self.setting, none) {
+        if !self.setting.budget.omits(Step::Numerics)
+            && let Some(h) = crate::numerics_check::artefact(self.setting, none)
+        {
             add(pool, h);
         }
         (self.hooks.progress)("looking for a second and third effect");
@@ -130,9 +133,8 @@ impl<'a, 'd> Search<'a, 'd> {
             seen || self.open(h).is_some_and(|o| unlikely(&o, ODDS_AGAINST_MORE) < self.options.alpha)
         };
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
-        let enough = || (self.hooks.expired)(COMPOSING);
         let around = |h: &Hypothesis<'d>| self.around(h);
-        let hear = Ask { unexplained: &unexplained, around: &around, enough: &enough };
+        let hear = Ask { unexplained: &unexplained, around: &around };
         compose(self.setting, none, candidates, pool, bounds, &hear);
         self.screened.take();
     }
@@ -144,7 +146,11 @@ impl<'a, 'd> Search<'a, 'd> {
         order
             .into_par_iter()
             .take(MOST_CARRIED)
-            .filter_map(|h| {
+            .enumerate()
+            .filter_map(|(i, h)| {
+                if i > 0 && self.setting.budget.omits(Step::OtherNoise) {
+                    return None;
+                }
                 let base = self.setting.further(&h.base, None, 3, self.setting.iterations)?;
                 (base.log_likelihood > none.base.log_likelihood)
                     .then(|| self.setting.hypothesis(h.effects.clone(), base))

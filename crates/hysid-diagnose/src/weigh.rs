@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::Base;
+use crate::budget::Step;
 use crate::compose::best_of;
 use crate::experiment::SETTLED;
 use crate::hypothesis::{Effect, Hypothesis, Setting, block_score};
@@ -50,11 +51,7 @@ pub fn settled(winner: f64, rival: f64, separation: Option<f64>) -> bool {
 }
 
 /// Scores on held-out blocks of the hypotheses that are close to the best; `None` for the others.
-pub fn block_scores(
-    setting: &Setting<'_>,
-    pool: &[Hypothesis<'_>],
-    expired: &(dyn Fn(f64) -> bool + Sync),
-) -> Vec<Option<(f64, Vec<f64>)>> {
+pub fn block_scores(setting: &Setting<'_>, pool: &[Hypothesis<'_>]) -> Vec<Option<(f64, Vec<f64>)>> {
     let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     let mut near: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].log_evidence > top - 8.0).collect();
     near.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
@@ -64,7 +61,7 @@ pub fn block_scores(
         .map(|i| {
             if (near.contains(&i) || i == 0)
                 && pool.len() > 1
-                && (i == 0 || pool[i].log_evidence >= top || !expired(1.0))
+                && (i == 0 || pool[i].log_evidence >= top || !setting.budget.omits(Step::Blocks))
             {
                 block_score(setting, &pool[i])
             } else {

@@ -69,8 +69,8 @@ pub struct Args {
     /// Run this binary instead of building hysid
     #[arg(long, value_name = "FILE")]
     binary: Option<PathBuf>,
-    /// Seconds that a diagnosis may take
-    #[arg(long, default_value_t = 60)]
+    /// Seconds that a diagnosis on one thread may take (a minute on two)
+    #[arg(long, default_value_t = 120)]
     time_limit: u64,
     /// Where the page, the score and the labels go
     #[arg(long, value_name = "DIR", default_value = "target/prove")]

@@ -206,7 +206,7 @@ mod tests {
         let f = facts(x.collect());
         assert!((f.resolution.unwrap() / 0.02 - 1.0).abs() < 1e-6);
         assert!(f.clipped.0 > 500 && f.clipped.1 > 500, "{:?}", f.clipped);
-        assert!((f.period.unwrap().0 / (std::f64::consts::TAU / 6.28) - 1.0).abs() < 1e-2, "{:?}", f.period);
+        assert!((f.period.unwrap().0 / (std::f64::consts::TAU * 0.01 / 0.0628) - 1.0).abs() < 1e-2, "{:?}", f.period);
         let band = f.band_hz.unwrap();
         assert!(band.0 < 1.1 && (0.9..6.0).contains(&band.1), "{band:?}");
     }

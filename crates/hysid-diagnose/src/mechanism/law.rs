@@ -87,6 +87,8 @@ pub struct LawParameter {
     pub neutral: Option<f64>,
     /// Whether it is reported under its own name.
     pub reported: bool,
+    /// Whether least squares alone cannot move it: a time of change, a period, a knee that few samples reach.
+    pub searched: bool,
 }
 
 /// A state that a law adds.
@@ -135,11 +137,20 @@ pub struct Law {
     pub derived: Vec<Derived>,
     /// No finite values of the parameters make it the baseline.
     pub never_baseline: bool,
+    /// It is the sum of two other mechanisms of the catalogue: alone it says no more than they do together.
+    pub sum_of_others: bool,
 }
 
 impl Law {
     fn new(change: Change) -> Self {
-        Self { change, parameters: Vec::new(), states: Vec::new(), derived: Vec::new(), never_baseline: false }
+        Self {
+            change,
+            parameters: Vec::new(),
+            states: Vec::new(),
+            derived: Vec::new(),
+            never_baseline: false,
+            sum_of_others: false,
+        }
     }
 
     /// A force that resists.
@@ -175,45 +186,32 @@ impl Law {
 
     /// An amplitude between `low` and `high` (multiples of `measure`).
     #[must_use]
-    pub fn amplitude(mut self, name: impl Into<String>, measure: impl Into<String>, low: f64, high: f64) -> Self {
-        self.parameters.push(LawParameter {
-            name: name.into(),
-            measure: measure.into(),
-            role: Role::Amplitude,
-            range: Some((low, high)),
-            floor: None,
-            neutral: Some(0.0),
-            reported: true,
-        });
-        self
+    pub fn amplitude(self, name: impl Into<String>, measure: impl Into<String>, low: f64, high: f64) -> Self {
+        self.with(name.into(), measure.into(), Role::Amplitude).within(low, high).neutral(0.0)
     }
 
     /// A shape parameter.
     #[must_use]
-    pub fn shape(mut self, name: impl Into<String>, measure: impl Into<String>, grid: Grid) -> Self {
-        self.parameters.push(LawParameter {
-            name: name.into(),
-            measure: measure.into(),
-            role: Role::Shape(grid),
-            range: None,
-            floor: None,
-            neutral: None,
-            reported: true,
-        });
-        self
+    pub fn shape(self, name: impl Into<String>, measure: impl Into<String>, grid: Grid) -> Self {
+        self.with(name.into(), measure.into(), Role::Shape(grid))
     }
 
     /// A parameter that the recording sets and nothing fits: the first value of its grid.
     #[must_use]
-    pub fn constant(mut self, name: impl Into<String>, measure: impl Into<String>, grid: Grid) -> Self {
+    pub fn constant(self, name: impl Into<String>, measure: impl Into<String>, grid: Grid) -> Self {
+        self.with(name.into(), measure.into(), Role::Constant(grid))
+    }
+
+    fn with(mut self, name: String, measure: String, role: Role) -> Self {
         self.parameters.push(LawParameter {
-            name: name.into(),
-            measure: measure.into(),
-            role: Role::Constant(grid),
+            name,
+            measure,
+            role,
             range: None,
             floor: None,
             neutral: None,
             reported: true,
+            searched: false,
         });
         self
     }
@@ -248,6 +246,19 @@ impl Law {
     #[must_use]
     pub fn silent(self) -> Self {
         self.last(|p| p.reported = false)
+    }
+
+    /// The last parameter is searched line by line: least squares alone cannot move it.
+    #[must_use]
+    pub fn searched(self) -> Self {
+        self.last(|p| p.searched = true)
+    }
+
+    /// It is the sum of two other mechanisms of the catalogue.
+    #[must_use]
+    pub fn sum_of_others(mut self) -> Self {
+        self.sum_of_others = true;
+        self
     }
 
     /// States that no finite values of the parameters make it the baseline.

@@ -45,7 +45,7 @@ pub use family::{Block, Family};
 pub use law::{Change, Derived, Grid, Law, LawParameter, LawState, Purpose, Role, Start};
 pub(crate) use law::{log_grid, log_steps};
 pub use page::catalogue_page;
-pub use rewrite::{Amplitude, Reported, RewriteError, Rewritten, Shape};
+pub use rewrite::{Amplitude, Places, Reported, RewriteError, Rewritten, Shape};
 pub use sentence::{Value, number_with_unit};
 pub use signals::{Signals, band_but_for, excited_band};
 pub use survey::{Stretch, SurveyError, survey};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hysid_plant::{Expr, Initial, Parameter, Simulation, State, Unit};
 
 use super::signals::Signals;
-use super::{Change, Law, Mechanism, Purpose, Role, Start};
+use super::{Change, Grid, Law, Mechanism, Purpose, Role, Start};
 use crate::slot::{ForcePath, Slot, Target, force_path};
 
 /// A parameter whose zero is the baseline.
@@ -24,6 +24,31 @@ pub struct Shape {
     pub name: String,
     /// The values to try, in ascending order.
     pub grid: Vec<f64>,
+    /// Whether least squares alone cannot move it.
+    pub searched: bool,
+    /// What of the recording the values were taken from.
+    pub places: Places,
+}
+
+/// What of a recording the values of a shape point to: an effect that is looked for at many places is found at one of them by chance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Places {
+    /// Nothing in particular.
+    Any,
+    /// Moments.
+    Moments,
+    /// Lines of the residual's spectrum.
+    Lines,
+}
+
+impl Places {
+    fn of(grid: &Grid) -> Self {
+        match grid {
+            Grid::Times(_) => Self::Moments,
+            Grid::Peaks(_) => Self::Lines,
+            _ => Self::Any,
+        }
+    }
 }
 
 /// What `diagnosis.json` reports of an effect.
@@ -54,6 +79,8 @@ pub struct Rewritten {
     pub report: Vec<Reported>,
     /// States that were added.
     pub states: Vec<String>,
+    /// Whether the law is the sum of two others of the catalogue.
+    pub sum_of_others: bool,
 }
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
@@ -299,7 +326,8 @@ fn write_law(
                 values.dedup();
                 new.value = values.get(values.len() / 2).copied().unwrap_or(size);
                 new = new.within(low, high);
-                shapes.push(Shape { name: name.clone(), grid: values });
+                let (searched, places) = (parameter.searched, Places::of(grid));
+                shapes.push(Shape { name: name.clone(), grid: values, searched, places });
             }
             Role::Constant(grid) => {
                 new.value = signals.values(grid, size).first().copied().unwrap_or(size);
@@ -357,5 +385,14 @@ fn write_law(
         neutral.retain(|(name, _)| amplitudes.iter().any(|a| a.name == *name));
     }
     let linear = purpose == Purpose::Screening && !matches!(law.change, Change::Inertia { .. });
-    Ok(Rewritten { simulation: written, amplitudes, shapes, neutral, linear, report, states })
+    Ok(Rewritten {
+        simulation: written,
+        amplitudes,
+        shapes,
+        neutral,
+        linear,
+        report,
+        states,
+        sum_of_others: law.sum_of_others,
+    })
 }

@@ -54,6 +54,7 @@ fn look(
     let done: Vec<Option<(Family, Stage)>> = starts
         .into_par_iter()
         .map(|(family, before)| {
+            desk.go_on()?;
             let mut trainer = desk.trainer(&family.derived, family.given())?;
             let s = desk.split(&trainer, LOOKS[round])?;
             let from = before.map(|b| b.fit);

@@ -6,7 +6,7 @@ use hysid_narx::{Derived, Fit, NarxError, Trainer, Window};
 use super::data::{Samples, Spread, noise_level, spread};
 use super::growth::Stage;
 use super::split::{Split, split};
-use super::{IdentifyError, Options, Source};
+use super::{IdentifyError, Options, Source, Stop};
 
 /// The recordings at one rate.
 pub(crate) struct Desk<'a> {
@@ -19,6 +19,7 @@ pub(crate) struct Desk<'a> {
     /// Signals of the recordings, with thresholds for the signs of differences; derived inputs join them.
     signals: Signals,
     trials: Vec<Trial>,
+    stop: Stop<'a>,
 }
 
 /// What a sound model endures: a recording with its inputs held, enlarged, made smaller, or with pulses on them.
@@ -47,6 +48,7 @@ impl<'a> Desk<'a> {
         options: &'a Options,
         all: &[Samples],
         decimation: usize,
+        stop: Stop<'a>,
     ) -> Result<Self, IdentifyError> {
         let samples: Vec<Samples> = all.iter().map(|s| s.every(decimation)).collect();
         let y = spread(samples.iter().flat_map(|s| &s.y)).ok_or_else(|| IdentifyError::TooShort {
@@ -60,7 +62,12 @@ impl<'a> Desk<'a> {
             signals = signals.with_threshold(Signal::Input(i), SIGN_SIGMAS * noise);
         }
         let trials = trials(&samples, y);
-        Ok(Self { source, options, decimation, samples, y, signals, trials })
+        Ok(Self { source, options, decimation, samples, y, signals, trials, stop })
+    }
+
+    /// An error where the caller wants no more.
+    pub(crate) fn go_on(&self) -> Result<(), IdentifyError> {
+        if (self.stop)() { Err(IdentifyError::Stopped) } else { Ok(()) }
     }
 
     /// Number of recorded inputs.

@@ -30,7 +30,7 @@ mod verify;
 
 pub use options::{Criterion, Decimate, Factors, LARGEST_DEGREE, LARGEST_LAG, LARGEST_TERMS, Options};
 pub use path::PathPoint;
-pub use recipe::{Identified, Progress, Source, identify};
+pub use recipe::{Identified, Progress, Source, Stop, identify, identify_until};
 pub use report::{Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, NoiseLine, Role, Series, TermLine};
 
 use hysid_narx::NarxError;
@@ -77,6 +77,9 @@ pub enum IdentifyError {
     /// A signal named twice.
     #[error("column `{0}` is given twice")]
     Twice(String),
+    /// The caller wanted no more of it.
+    #[error("it was stopped before it was done")]
+    Stopped,
     /// The model's own refusal.
     #[error(transparent)]
     Narx(#[from] NarxError),

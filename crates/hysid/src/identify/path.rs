@@ -106,7 +106,7 @@ mod tests {
         let (recordings, inputs) = ([recording], ["u".to_string()]);
         let source = Source { recordings: &recordings, inputs: &inputs, output: "y" };
         let choices = Choices::default();
-        let desk = Desk::new(source, &choices, &gather(source).unwrap(), 1).unwrap();
+        let desk = Desk::new(source, &choices, &gather(source).unwrap(), 1, &|| false).unwrap();
         let trainer = desk.trainer(&[], 2).unwrap();
         let windows = [Window { record: 0, range: 0..20 }, Window { record: 0, range: 30..58 }];
         let texts = ["1", "y[n-1]", "u[n]", "u[n]^2", "u[n-2]*y[n-1]"];

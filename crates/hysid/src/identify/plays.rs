@@ -53,6 +53,7 @@ fn of_shares(desk: &Desk<'_>, ny: usize, nu: usize, shares: &[f64]) -> Result<Op
     let done: Vec<Option<(Family, Stage)>> = pasts(desk)
         .into_par_iter()
         .map(|past| {
+            desk.go_on()?;
             let family = family(desk, ny, nu, shares, &past);
             let mut trainer = desk.trainer(&family.derived, family.given())?;
             let s = desk.split(&trainer, LOOK.0)?;

@@ -53,6 +53,9 @@ pub struct Identified {
 /// Told what is being done, from any thread.
 pub type Progress<'a> = &'a (dyn Fn(&str) + Sync);
 
+/// Asked, from any thread, whether to give up.
+pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// Samples that the first and the second round look at.
 const LOOKS: [usize; 2] = [4000, 9000];
 /// Samples for each linear term that it looks at, at least: with fewer a long model fits what is by chance in them.
@@ -83,6 +86,19 @@ const FINAL_STEPS: usize = 12;
 /// # Errors
 /// [`IdentifyError`]: what is wrong with the recordings or the options.
 pub fn identify(source: Source<'_>, options: &Options, progress: Progress<'_>) -> Result<Identified, IdentifyError> {
+    identify_until(source, options, progress, &|| false)
+}
+
+/// As [`identify`], given up where `stop` says so: it is asked before each round of each family.
+///
+/// # Errors
+/// [`IdentifyError`]; [`IdentifyError::Stopped`] where it was given up.
+pub fn identify_until(
+    source: Source<'_>,
+    options: &Options,
+    progress: Progress<'_>,
+    stop: Stop<'_>,
+) -> Result<Identified, IdentifyError> {
     if let Some(problem) = options.problem() {
         return Err(IdentifyError::Option(problem));
     }
@@ -95,8 +111,9 @@ pub fn identify(source: Source<'_>, options: &Options, progress: Progress<'_>) -
     let mut found: Option<Winner<'_>> = None;
     let mut refused = None;
     for rate in rates {
-        let desk = Desk::new(source, options, &samples, rate)?;
+        let desk = Desk::new(source, options, &samples, rate, stop)?;
         match compete(desk, progress) {
+            Err(IdentifyError::Stopped) => return Err(IdentifyError::Stopped),
             Err(e) => refused = refused.or(Some(e)),
             Ok(w) => {
                 decisions.push(format!(
@@ -280,6 +297,7 @@ fn first_round(
     stage: Option<Stage>,
     progress: Progress<'_>,
 ) -> Result<Option<Runner>, IdentifyError> {
+    desk.go_on()?;
     progress(&family.name);
     let mut trainer = desk.trainer(&family.derived, family.given())?;
     let s = desk.split(&trainer, look(&family, 0))?;
@@ -304,6 +322,7 @@ fn first_round(
 
 fn second_round(desk: &Desk<'_>, runner: Runner, progress: Progress<'_>) -> Result<Option<Runner>, IdentifyError> {
     let Runner { family, stage, score, mut passed, .. } = runner;
+    desk.go_on()?;
     progress(&format!("growing {}", family.name));
     let mut trainer = desk.trainer(&family.derived, family.given())?;
     let large = family.linear.len() > LARGE;

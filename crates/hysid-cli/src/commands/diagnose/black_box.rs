@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use hysid::identify::{Columns, Decimate, Factors, FitReport, IdentifyError, Options, Source, identify};
+use hysid::identify::{Columns, Decimate, Factors, FitReport, IdentifyError, Options, Source, Stop, identify_until};
 use hysid_diagnose::file::DiagnosisFile;
 use hysid_diagnose::picture::{Picture, RecordPicture, Role};
 use hysid_narx::NarxModel;
@@ -28,11 +28,11 @@ pub type Models = Vec<Result<NarxModel, String>>;
 /// The models where they learn from whole recordings, so that the diagnosis need not be waited for; `None` where it decides on the samples.
 pub fn early(simulation: &Simulation, intake: &Intake, seed: u64) -> Option<impl FnOnce() -> Models + Send> {
     let whole = !intake.holdout.is_empty() && samples(intake) <= MOST_SAMPLES;
-    whole.then_some(move || models(&intake.estimation, &intake.holdout, simulation, seed))
+    whole.then_some(move || models(&intake.estimation, &intake.holdout, simulation, seed, &|| false))
 }
 
-/// The models, learnt from the samples that the diagnosis did not hold out.
-pub fn late(picture: &Picture, simulation: &Simulation, intake: &Intake, seed: u64) -> Models {
+/// The models, learnt from the samples that the diagnosis did not hold out; given up where `stop` says so.
+pub fn late(picture: &Picture, simulation: &Simulation, intake: &Intake, seed: u64, stop: Stop<'_>) -> Models {
     let held: Vec<&RecordPicture> = picture.records.iter().filter(|r| r.role == Role::HoldOut).collect();
     let blocks = intake.holdout.is_empty();
     let estimation = if samples(intake) > MOST_SAMPLES {
@@ -42,20 +42,26 @@ pub fn late(picture: &Picture, simulation: &Simulation, intake: &Intake, seed: u
     } else {
         &intake.estimation
     };
-    models(estimation, if blocks { &intake.estimation } else { &intake.holdout }, simulation, seed)
+    models(estimation, if blocks { &intake.estimation } else { &intake.holdout }, simulation, seed, stop)
 }
 
 fn samples(intake: &Intake) -> usize {
     intake.estimation.iter().map(Recording::len).sum()
 }
 
-fn models(estimation: &[Recording], holdout: &[Recording], simulation: &Simulation, seed: u64) -> Models {
+fn models(
+    estimation: &[Recording],
+    holdout: &[Recording],
+    simulation: &Simulation,
+    seed: u64,
+    stop: Stop<'_>,
+) -> Models {
     // Two symbols may stand for one column.
     let columns: BTreeSet<&String> = simulation.inputs.iter().map(|i| &i.column).collect();
     let inputs: Vec<String> = columns.into_iter().cloned().collect();
     let of_output = |output: &hysid_plant::Output| {
         let source = Source { recordings: estimation, inputs: &inputs, output: &output.column };
-        rate_of(estimation, holdout).and_then(|()| model(source, seed).map_err(|e| e.to_string()))
+        rate_of(estimation, holdout).and_then(|()| model(source, seed, stop).map_err(|e| e.to_string()))
     };
     simulation.outputs.iter().map(of_output).collect()
 }
@@ -94,14 +100,15 @@ pub fn score(file: &mut DiagnosisFile, models: Models, picture: &Picture, simula
 /// On development cases the error was the same within a few per cent at a quarter of the time of the whole search. In recordings that
 /// blocks cut to pieces, long lags can win on pieces and fail over the whole length: then shorter ones are tried. The hold-out chooses
 /// nothing: models are judged by a free run through the recordings that they were made from.
-fn model(source: Source<'_>, seed: u64) -> Result<NarxModel, IdentifyError> {
+fn model(source: Source<'_>, seed: u64, stop: Stop<'_>) -> Result<NarxModel, IdentifyError> {
     let quiet = |_: &str| {};
     let mut best: Option<(f64, NarxModel)> = None;
     for lags in [None, Some(6), Some(3), Some(2)] {
         let options = Options { lags_output: lags, lags_input: lags, seed, ..Options::default() };
         let linear = Options { degree: Some(1), factors: Factors::Polynomial, ..options.clone() };
-        let linear = match (identify(source, &linear, &quiet), &best) {
+        let linear = match (identify_until(source, &linear, &quiet, stop), &best) {
             (Ok(linear), _) => linear,
+            (Err(IdentifyError::Stopped), _) => return Err(IdentifyError::Stopped),
             (Err(_), Some(_)) => continue,
             (Err(why), None) => return Err(why),
         };
@@ -113,7 +120,11 @@ fn model(source: Source<'_>, seed: u64) -> Result<NarxModel, IdentifyError> {
             ..options
         };
         let claimed = linear.held_rmse;
-        for found in [identify(source, &options, &quiet).ok(), Some(linear)].into_iter().flatten() {
+        let rich = match identify_until(source, &options, &quiet, stop) {
+            Err(IdentifyError::Stopped) => return Err(IdentifyError::Stopped),
+            rich => rich.ok(),
+        };
+        for found in [rich, Some(linear)].into_iter().flatten() {
             let error = whole_run(&found.model, source);
             if best.as_ref().is_none_or(|b| error < b.0) {
                 best = Some((error, found.model));

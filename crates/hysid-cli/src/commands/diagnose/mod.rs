@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use hysid_diagnose::file::VerdictKind;
-use hysid_diagnose::{COMPOSING, DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
+use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 
 use self::folder::Folder;
@@ -57,7 +57,8 @@ pub struct Args {
     /// Threads; all cores unless given. The result does not depend on it
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Leave out optional steps after so many seconds. The result may then depend on the machine
+    /// Answer after about so many seconds with what was found until then; nothing is firm where the search was cut short, and the
+    /// result depends on the machine
     #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
 }
@@ -87,7 +88,7 @@ fn work(args: &Args) -> Result<(), Failure> {
     let expired = |share: f64| args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > share * limit);
     let watch = Watch { progress: &progress, expired: &expired, limited: args.time_limit.is_some() };
     let files = Files { estimation: &args.recording, holdout: &args.holdout };
-    let (mut outcome, folder) = match (&args.simulation, &args.simulated) {
+    let (outcome, folder) = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
             let (simulation, name) = simulation_file::read(file)?;
             let intake = files.of_simulation(&simulation)?;
@@ -117,12 +118,6 @@ fn work(args: &Args) -> Result<(), Failure> {
             return Err(Failure::BadInput("give a simulation file, or --simulated with --input and --output".into()));
         }
     };
-    if let Some(limit) = args.time_limit.filter(|_| expired(COMPOSING)) {
-        outcome.file.notes.push(format!(
-            "the time limit of {limit} s was nearly or wholly used up: steps that refine the verdict (further effects, held-out blocks, an experiment, a black box) \
-             may have been left out, and the result depends on the machine"
-        ));
-    }
 
     let page = hysid_report::diagnosis::page(&outcome.file, &outcome.picture, &crate::provenance());
     folder.text("report.html", &page)?;
@@ -190,14 +185,16 @@ fn answer(
         diagnose(&request, &hooks)
     });
     let mut outcome = outcome.map_err(|e| refused(&e, &request))?;
+    let late = || (watch.expired)(1.0);
     let models = models.into_inner().or_else(|| {
-        (!(watch.expired)(1.0)).then(|| {
+        (!late()).then(|| {
             told();
-            black_box::late(&outcome.picture, simulation, intake, options.seed)
+            black_box::late(&outcome.picture, simulation, intake, options.seed, &late)
         })
     });
-    if let Some(models) = models {
-        black_box::score(&mut outcome.file, models, &outcome.picture, simulation, intake);
+    match models {
+        Some(models) => black_box::score(&mut outcome.file, models, &outcome.picture, simulation, intake),
+        None => outcome.file.notes.push("the time limit left no time for a black box beside the simulation".into()),
     }
     Ok(outcome)
 }

@@ -15,8 +15,9 @@ pub static ASYMMETRIC_FRICTION: Mechanism = Mechanism {
     law: |slot, _| {
         if is_there(slot) {
             // The symmetric part is there already: only what the directions differ by.
-            return Law::force("F_a*abs(sign(v))").amplitude("F_a", "F", -1.0, 1.0);
+            return Law::force("F_a*abs(sign(v))").amplitude("F_a", "F", -1.0, 1.0).sum_of_others();
         }
+        // Dry friction and a constant force, sticking included.
         Law::force("(F_c + F_a*sign(v))*sign(v)")
             .amplitude("F_c", "F", 0.0, 1.0)
             .silent()
@@ -24,6 +25,7 @@ pub static ASYMMETRIC_FRICTION: Mechanism = Mechanism {
             .report("F_plus", "F", "F_c + F_a")
             .report("F_minus", "F", "F_c - F_a")
             .report("F_a", "F", "F_a")
+            .sum_of_others()
     },
     contains: &["coulomb_friction"],
     confusable: &["input_offset", "gravity"],

@@ -14,8 +14,10 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     law: |_, purpose| {
         let level = Grid::Quantiles("u", vec![0.5, 0.65, 0.8, 0.9, 0.95, 0.99]);
         match purpose {
-            Purpose::Screening => Law::replace("u + w*(max(min(u, s), -s) - u)").weight().shape("s", "u", level),
-            Purpose::Refit => Law::replace("max(min(u, s), -s)").shape("s", "u", level),
+            Purpose::Screening => {
+                Law::replace("u + w*(max(min(u, s), -s) - u)").weight().shape("s", "u", level).searched()
+            }
+            Purpose::Refit => Law::replace("max(min(u, s), -s)").shape("s", "u", level).searched(),
         }
     },
     contains: &[],

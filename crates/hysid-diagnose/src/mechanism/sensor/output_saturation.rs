@@ -14,8 +14,10 @@ pub static OUTPUT_SATURATION: Mechanism = Mechanism {
     law: |_, purpose| {
         let level = Grid::Quantiles("y", vec![0.5, 0.7, 0.85, 0.93, 0.98, 0.995]);
         match purpose {
-            Purpose::Screening => Law::replace("y + w*(max(min(y, s), -s) - y)").weight().shape("s", "y", level),
-            Purpose::Refit => Law::replace("max(min(y, s), -s)").shape("s", "y", level),
+            Purpose::Screening => {
+                Law::replace("y + w*(max(min(y, s), -s) - y)").weight().shape("s", "y", level).searched()
+            }
+            Purpose::Refit => Law::replace("max(min(y, s), -s)").shape("s", "y", level).searched(),
         }
     },
     contains: &[],

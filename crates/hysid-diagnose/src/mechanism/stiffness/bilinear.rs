@@ -12,11 +12,10 @@ pub static BILINEAR_STIFFNESS: Mechanism = Mechanism {
     applies: |slot| slot.has("x"),
     already: &["max(x, 0)", "max(0, x)", "max(x - P, 0)", "max(0, x - P)", "step(x)*x", "x*step(x)"],
     law: |_, _| {
-        Law::force("k_b*max(x - x_0, 0)").amplitude("k_b", "F/x", -2.0, 50.0).shape(
-            "x_0",
-            "x",
-            Grid::SignedQuantiles("x", vec![0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9]),
-        )
+        Law::force("k_b*max(x - x_0, 0)")
+            .amplitude("k_b", "F/x", -2.0, 50.0)
+            .shape("x_0", "x", Grid::SignedQuantiles("x", vec![0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9]))
+            .searched()
     },
     contains: &[],
     confusable: &["quadratic_stiffness", "gap_stop"],

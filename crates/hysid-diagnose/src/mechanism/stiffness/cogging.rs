@@ -20,6 +20,7 @@ pub static COGGING: Mechanism = Mechanism {
             .shape("p_x", "x", Grid::Reach("x", log_steps(0.05, 1.0, 40)))
             // Three standard deviations are about the whole travel: a longer period is a curved spring and no ripple.
             .within(0.005, 3.0)
+            .searched()
             .report("A", "F", "sqrt(A_s^2 + A_c^2)")
             .report("phi", "1", "atan2(A_c, A_s)")
     },

@@ -12,11 +12,10 @@ pub static GAP_STOP: Mechanism = Mechanism {
     applies: |slot| slot.has("x"),
     already: &["max(x - P, 0)", "max(0, x - P)", "max(abs(x) - P, 0)", "max(0, abs(x) - P)"],
     law: |_, _| {
-        Law::force("k_g*(max(x - g, 0) - max(-x - g, 0))").amplitude("k_g", "F/x", -2.0, 50.0).shape(
-            "g",
-            "x",
-            Grid::Quantiles("x", vec![0.3, 0.45, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97]),
-        )
+        Law::force("k_g*(max(x - g, 0) - max(-x - g, 0))")
+            .amplitude("k_g", "F/x", -2.0, 50.0)
+            .shape("g", "x", Grid::Quantiles("x", vec![0.3, 0.45, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97]))
+            .searched()
     },
     contains: &[],
     confusable: &["cubic_stiffness", "quintic_stiffness"],

@@ -16,6 +16,7 @@ pub static ABRUPT_CHANGE: Mechanism = Mechanism {
         Law::replace("p*(1 + delta*max(0, min(1, (t - t_0)/h_0)))")
             .amplitude("delta", "1", -0.95, 3.0)
             .shape("t_0", "t", Grid::Times(24))
+            .searched()
             .constant("h_0", "h", Grid::Values(vec![2.0]))
             .silent()
     },

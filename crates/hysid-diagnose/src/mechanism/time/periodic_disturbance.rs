@@ -20,6 +20,7 @@ pub static PERIODIC_DISTURBANCE: Mechanism = Mechanism {
             // Fewer than four cycles are a drift, which anything slow imitates.
             .shape("f_d", "1/t", Grid::Peaks(24))
             .at_least(4.0, "1/T")
+            .searched()
             .report("A", "F", "sqrt(A_s^2 + A_c^2)")
             .report("phi", "1", "atan2(A_c, A_s)")
     },
