@@ -8,6 +8,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Share of the time after which the search ends: what was found must still be judged.
 const SEARCH: f64 = 0.75;
+/// Share after which what remains is not tested: that takes as long as the first screening.
+const TESTS: f64 = 0.85;
 /// Share after which what refines the verdict is left out.
 const WHOLE: f64 = 1.0;
 
@@ -68,7 +70,8 @@ impl<'a> Budget<'a> {
     /// Whether a step of the search must be left out; it is remembered.
     pub fn omits(&self, step: Step) -> bool {
         let share = match step {
-            Step::Blocks | Step::Remains | Step::Experiment => WHOLE,
+            Step::Remains => TESTS,
+            Step::Blocks | Step::Experiment => WHOLE,
             _ => SEARCH,
         };
         let late = (self.expired)(share);

@@ -255,6 +255,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         support.iter_mut().for_each(Support::weaken);
     }
     file.verdict = verdict(&support);
+    // A mismatch that is significant stays one, though nothing that was fitted in time explains it.
+    let unexplained = significant && winner == 0 && budget.unfinished();
+    if unexplained {
+        file.verdict = VerdictKind::Ambiguous;
+    }
     let best = &pool[winner];
     file.effects = best
         .effects
@@ -365,10 +370,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     }
     file.summary = summary(&file);
     if let Some(note) = budget.note() {
-        if budget.unfinished() && file.verdict == VerdictKind::NoSignificantMismatch {
+        if unexplained {
+            file.summary = "Something is missing; the search was cut short by the time limit before an effect was found that explains it.".into();
+        } else if budget.unfinished() && file.verdict == VerdictKind::NoSignificantMismatch {
             file.summary =
-                "The search was cut short by the time limit; what was done of it shows no mismatch that it could name."
-                    .into();
+                "The search was cut short by the time limit; what was done of it shows no significant mismatch.".into();
         }
         file.notes.push(note);
     }

@@ -98,18 +98,16 @@ fn a_static_simulation_is_stepped_finely_enough_for_the_memory_that_an_effect_ad
 #[test]
 fn a_search_that_was_cut_short_is_never_firm_and_says_so() {
     use std::sync::atomic::{AtomicUsize, Ordering};
-    let friction = |_: f64, v: f64| if v.abs() < 1e-9 { 0.0 } else { 2.0 * v.signum() };
+    let friction = |_: f64, v: f64| 1.5 * (v / 5e-4).tanh();
     let (est, val) = (recording("est.csv", 1, 900, friction), recording("val.csv", 2, 900, friction));
     // Time is up at the so-many-th time that it is asked for.
     for last in [0, 1, 5, 12, 25, 60] {
         let asked = AtomicUsize::new(0);
         let expired = |_: f64| asked.fetch_add(1, Ordering::Relaxed) >= last;
         let d = run_until(&expired, BASELINE, std::slice::from_ref(&est), std::slice::from_ref(&val)).unwrap().file;
-        let firm = |v| matches!(v, VerdictKind::Named | VerdictKind::Family | VerdictKind::NotInCatalogue);
-        assert!(!firm(d.verdict), "{last}: {:?}", d.verdict);
         assert!(d.effects.iter().all(|e| e.probability < 0.9 && e.family_probability < 0.9), "{last}");
         assert!(d.notes.iter().any(|n| n.starts_with("the time limit left out")), "{last}: {:?}", d.notes);
-        assert!(!d.effects.is_empty(), "{last}: the likeliest is fitted, however little time there is");
+        assert_eq!(d.verdict, VerdictKind::Ambiguous, "{last}: what is significant stays so: {}", d.summary);
         assert!(d.fit[0].rmse_after.is_some_and(f64::is_finite) || d.fit[0].rmse_before.is_some(), "{last}");
     }
 }
