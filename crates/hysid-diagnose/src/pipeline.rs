@@ -309,6 +309,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     }
     if significant
         && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous)
+        && winner > 0
         && !budget.omits(Step::Experiment)
     {
         (hooks.progress)("looking for an experiment");
