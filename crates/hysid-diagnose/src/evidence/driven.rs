@@ -8,10 +8,12 @@
 use super::projector::norm2;
 use super::response::{Filter, ForcePath};
 
-/// Poles of the force's autoregression, white first: samples of memory double from one to the next.
-const POLES: [f64; 5] = [0.0, 0.5, 0.75, 0.88, 0.94];
+/// Poles of a coloured force's autoregression: samples of memory double from one to the next.
+const POLES: [f64; 4] = [0.5, 0.75, 0.88, 0.94];
 /// Decades between the first guesses of the share of the force, and where the search ends.
-const DECADES: (f64, f64) = (1.0, 0.125);
+const DECADES: (f64, f64) = (1.0, 0.25);
+/// Log likelihood by which a white force may trail another model before its colour is not asked for.
+const HOPELESS: f64 = 150.0;
 /// Decades of the share of the force in the output's power that are searched.
 const RANGE: (f64, f64) = (-3.0, 9.0);
 /// Rows of the longest stretch that a scale of the response is taken from.
@@ -32,30 +34,22 @@ pub struct Driven {
 type Point = (f64, f64, Driven);
 
 impl Driven {
-    /// The process noise of these stretches of one residual by this way, with its log likelihood; colour of the force where it pays `price`.
-    pub fn fit(path: &ForcePath, stretches: &[&[f64]], price: f64) -> Option<(Self, f64)> {
-        let mut best: Option<Point> = None;
-        for (i, pole) in POLES.into_iter().enumerate() {
-            let from = best.as_ref().map_or((0.0, DECADES.0), |b| (b.0, 0.5 * DECADES.0));
-            let Some(found) = Self::search(path, pole, stretches, from) else { break };
-            let (first, bar) = (i == 1, best.as_ref().map_or(f64::NEG_INFINITY, |b| b.1));
-            if found.1 < bar {
-                // A long memory may help where a short one does not.
-                if first {
-                    continue;
+    /// The process noise of these stretches of one residual by this way, with its log likelihood; colour of the force where it pays `price`,
+    /// looked for where a white one comes near the likelihood `most` of another model.
+    pub fn fit(path: &ForcePath, stretches: &[&[f64]], price: f64, most: f64) -> Option<(Self, f64)> {
+        let white = Self::search(path, 0.0, stretches, (0.0, DECADES.0))?;
+        let mut coloured: Option<Point> = None;
+        if white.1 >= most - HOPELESS {
+            for pole in POLES {
+                let from = coloured.as_ref().map_or(white.0, |c| c.0);
+                let Some(found) = Self::search(path, pole, stretches, (from, 0.5 * DECADES.0)) else { break };
+                if coloured.as_ref().is_some_and(|c| found.1 < c.1) {
+                    break;
                 }
-                break;
-            }
-            if i == 0 || found.1 > bar {
-                best = Some(found);
+                coloured = Some(found);
             }
         }
-        let coloured = best?;
-        if coloured.2.coefficients == 1 {
-            return Some((coloured.2, coloured.1));
-        }
-        let white = Self::search(path, 0.0, stretches, (coloured.0, DECADES.0))?;
-        let chosen = if coloured.1 - price > white.1 { coloured } else { white };
+        let chosen = coloured.filter(|c| c.1 - price > white.1).unwrap_or(white);
         Some((chosen.2, chosen.1))
     }
 
@@ -186,7 +180,7 @@ mod tests {
         let size = 40.0;
         let e: Vec<Vec<f64>> =
             (0..2).map(|i| simulated(&path, &white(6000, 20 + i), size, 40 + i).into_iter().collect()).collect();
-        let (m, _) = Driven::fit(&path, &[&e[0], &e[1]], 4.7).unwrap();
+        let (m, _) = Driven::fit(&path, &[&e[0], &e[1]], 4.7, f64::NEG_INFINITY).unwrap();
         assert_eq!(m.coefficients(), 1);
         assert!((m.sigma - 1.0).abs() < 0.03, "{}", m.sigma);
         // The variance of the force, from the filter's settled innovation: it grows with the share alone.

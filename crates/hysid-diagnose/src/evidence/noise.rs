@@ -115,7 +115,7 @@ impl NoiseModel {
         let total: usize = stretches.iter().map(|s| s.len()).sum();
         let price = 0.5 * (total as f64).ln();
         for path in paths {
-            let Some((driven, likelihood)) = Driven::fit(path, stretches, price) else { continue };
+            let Some((driven, likelihood)) = Driven::fit(path, stretches, price, most) else { continue };
             let score = likelihood - price * driven.coefficients() as f64;
             if score > most {
                 (best, most) = (Self { kind: Kind::Driven(driven) }, score);

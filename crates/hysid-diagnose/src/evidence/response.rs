@@ -13,7 +13,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Change of a gain below which the filter has settled.
-const SETTLED: f64 = 1e-10;
+const SETTLED: f64 = 1e-8;
 /// The way from a force to one output, from row to row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForcePath {
@@ -76,20 +76,21 @@ impl ForcePath {
         (a, self.c.clone().resize_vertically(n + 1, 0.0), added, start)
     }
 
-    /// Variance of the output, `rows` rows from the start, for a force of unit variance.
+    /// Variance of the output, `rows` rows from the start, for a force of unit variance that begins at zero.
     pub(super) fn variance(&self, pole: f64, rows: usize) -> f64 {
-        let (a, c, added, mut p) = self.noise(pole);
-        let mut last = 0.0;
+        let (mut force, mut x, mut sum) = ((1.0 - pole * pole).sqrt(), DVector::zeros(self.c.len()), 0.0);
         for _ in 0..rows {
-            p = &a * &p * a.transpose() + &added;
-            let v = c.dot(&(&p * &c));
-            if v > 0.0 && (v - last).abs() < 1e-6 * v {
-                return v;
-            }
-            last = v;
+            x = &self.a * &x + &self.b * force;
+            force *= pole;
+            sum += self.c.dot(&x).powi(2);
         }
-        last
+        sum
     }
+}
+
+/// Inner product of a few numbers.
+fn dot_short(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// One row's part in the filter.
@@ -115,16 +116,35 @@ impl Filter {
     /// For stretches of up to `rows` rows and a force of this variance; `None` where it is not finite.
     pub(super) fn new(path: &ForcePath, pole: f64, variance: f64, rows: usize) -> Option<Self> {
         let (a, c, added, start) = path.noise(pole);
-        let (added, mut p) = (added * variance, start * variance);
+        let n = c.len();
+        // Symmetric matrices are the same by rows and by columns; nothing is allocated within the recursion but the gains.
+        let a = a.transpose().as_slice().to_vec();
+        let added = (added * variance).as_slice().to_vec();
+        let mut p = (start * variance).as_slice().to_vec();
+        let (mut pc, mut half) = (vec![0.0; n], vec![0.0; n * n]);
+        let times = |m: &[f64], x: &[f64], i: usize| dot_short(&m[i * n..(i + 1) * n], x);
         let mut steps: Vec<Step> = Vec::new();
         for _ in 0..rows.max(1) {
-            let pc = &p * &c;
-            let power = 1.0 + c.dot(&pc).max(0.0);
-            let k = &pc / power;
-            let gain = &a * &k;
-            p = &a * (&p - &k * pc.transpose()) * a.transpose() + &added;
-            p = 0.5 * (&p + p.transpose());
-            let step = Step { sigma: power.sqrt(), gain: gain.as_slice().to_vec() };
+            for (i, pc) in pc.iter_mut().enumerate() {
+                *pc = times(&p, c.as_slice(), i);
+            }
+            let power = 1.0 + dot_short(c.as_slice(), &pc).max(0.0);
+            let gain: Vec<f64> = (0..n).map(|i| times(&a, &pc, i) / power).collect();
+            for (i, row) in p.chunks_exact_mut(n).enumerate() {
+                row.iter_mut().zip(&pc).for_each(|(p, other)| *p -= pc[i] * other / power);
+            }
+            // a (p a'), its upper half mirrored.
+            for (i, row) in half.chunks_exact_mut(n).enumerate() {
+                row.iter_mut().enumerate().for_each(|(j, h)| *h = times(&p, &a[j * n..(j + 1) * n], i));
+            }
+            for i in 0..n {
+                for j in i..n {
+                    let v: f64 = (0..n).map(|k| a[i * n + k] * half[k * n + j]).sum();
+                    p[i * n + j] = v + added[i * n + j];
+                    p[j * n + i] = p[i * n + j];
+                }
+            }
+            let step = Step { sigma: power.sqrt(), gain };
             if !step.sigma.is_finite() || step.gain.iter().any(|g| !g.is_finite()) {
                 return None;
             }
@@ -134,11 +154,11 @@ impl Filter {
             });
             steps.push(step);
             // The first rows of a chain of integrators see nothing of the force.
-            if settled && steps.len() > 2 * c.len() + 2 {
+            if settled && steps.len() > 2 * n + 2 {
                 break;
             }
         }
-        Some(Self { a: a.transpose().as_slice().to_vec(), c: c.as_slice().to_vec(), steps })
+        Some(Self { a, c: c.as_slice().to_vec(), steps })
     }
 
     pub(super) fn step(&self, k: usize) -> &Step {
@@ -166,7 +186,8 @@ impl Filter {
     }
 
     pub(super) fn log_scale(&self, n: usize) -> f64 {
-        (0..n).map(|k| self.step(k).sigma.ln()).sum()
+        let first: f64 = self.steps.iter().take(n).map(|s| s.sigma.ln()).sum();
+        first + n.saturating_sub(self.steps.len()) as f64 * self.step(usize::MAX).sigma.ln()
     }
 }
 
