@@ -195,8 +195,12 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             simulation.map_equations(|e| e.substitute(symbol, &by));
             Ok(())
         }
-        (Target::SymbolIn(symbol, states), Change::Replace(text)) => {
-            let by = writer.text(text)?;
+        (Target::SymbolIn(symbol, states, others), Change::Replace(text)) => {
+            let by = match others {
+                // The sum is replaced where the symbol stands; its other members stay in the equations and are taken off here.
+                Some(others) => writer.text(text)? - others.clone(),
+                None => writer.text(text)?,
+            };
             for name in states {
                 let state = simulation.state_mut(name).ok_or("the state is gone")?;
                 state.derivative = state.derivative.substitute(symbol, &by);

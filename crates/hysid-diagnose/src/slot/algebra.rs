@@ -36,6 +36,34 @@ pub(crate) fn linear_coefficient(simulation: &Simulation, expr: &Expr, symbol: &
     found.reduce(|a, b| a + b).map(|c| c.simplified())
 }
 
+/// `above/below` without the factors that both have.
+pub(crate) fn quotient(above: Expr, below: Expr) -> Expr {
+    fn factors(product: Expr, positive: &mut bool) -> Vec<Expr> {
+        match product {
+            Expr::Binary(BinaryOp::Mul, a, b) => {
+                factors(*a, positive).into_iter().chain(factors(*b, positive)).collect()
+            }
+            Expr::Neg(a) => {
+                *positive = !*positive;
+                factors(*a, positive)
+            }
+            other => vec![other],
+        }
+    }
+    let mut positive = true;
+    let (mut above, mut below) = (factors(above, &mut positive), factors(below, &mut positive));
+    above.retain(|a| match below.iter().position(|b| a == b) {
+        Some(at) => {
+            below.remove(at);
+            false
+        }
+        None => true,
+    });
+    let product = |factors: Vec<Expr>| factors.into_iter().reduce(|a, b| a * b).unwrap_or(Expr::Number(1.0));
+    let found = (product(above) / product(below)).simplified();
+    if positive { found } else { -found }
+}
+
 /// Whether every symbol is a parameter (or `pi`).
 pub(crate) fn only_parameters(simulation: &Simulation, expr: &Expr) -> bool {
     expr.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some())
@@ -73,6 +101,19 @@ mod tests {
         check("x*k/m + c*x", Some("k/m + c"));
         check("u - v*x", None);
         check("u", None);
+    }
+
+    #[test]
+    fn common_factors_cancel() {
+        let check = |above: &str, below: &str, expected: &str| {
+            let e = |text: &str| Expr::parse(text).unwrap();
+            assert_eq!(quotient(e(above), e(below)).to_string(), expected, "{above} over {below}");
+        };
+        check("k^2*c", "k^2", "c");
+        check("k", "k", "1");
+        check("c*m", "k*m", "c/k");
+        check("c", "k*m", "c/(k*m)");
+        check("k*(-c)", "k", "-c");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use hysid_plant::{Expr, Function, Memory, Simulation, Unit};
 
-use super::algebra::has_free_constant;
+use super::algebra::{has_free_constant, linear_coefficient, quotient};
 use super::motion::{ForcePath, Kinematic, Motion, force_path, kinematic, motions};
 use super::{Place, Slot, Target};
 
@@ -146,9 +146,10 @@ impl Finder<'_> {
         reached.iter().skip(1).any(|s| *s == other)
     }
 
+    /// What one part of the simulation passes on to another from which nothing comes back, and the states that receive it.
     fn cascades(&self) -> Vec<Slot> {
-        let mut slots = Vec::new();
         let known = |name: &str| self.original.state(name).is_some();
+        let mut links: Vec<(&str, Vec<String>)> = Vec::new();
         for source in self.simulation.states.iter().filter(|s| known(&s.name)) {
             let integrates = |name: &str| self.motions.iter().any(|m| m.v == source.name && m.x == Some(name));
             let driven: Vec<String> = self
@@ -159,19 +160,57 @@ impl Finder<'_> {
                 .filter(|s| !integrates(&s.name) && !self.reaches(&s.name, &source.name))
                 .map(|s| s.name.clone())
                 .collect();
+            if !driven.is_empty() {
+                links.push((&source.name, driven));
+            }
+        }
+        let mut slots = Vec::new();
+        while !links.is_empty() {
+            let (source, driven) = links.remove(0);
             let Some(first) = driven.first() else { continue };
+            // States of the first part that enter the same equations in one proportion are one signal.
+            let mut others: Option<Expr> = None;
+            links.retain(|(other, into)| {
+                let share = if *into == driven { self.proportion(source, other, &driven) } else { None };
+                let Some(share) = share else { return true };
+                let term = match share {
+                    Expr::Neg(share) => -(*share * Expr::symbol(*other)).simplified(),
+                    share => (share * Expr::symbol(*other)).simplified(),
+                };
+                others = Some(match others.take() {
+                    Some(sum) => (sum + term).simplified(),
+                    None => term,
+                });
+                false
+            });
+            let signal = match &others {
+                Some(others) => (Expr::symbol(source) + others.clone()).simplified(),
+                None => Expr::symbol(source),
+            };
             let mut slot = Slot::new(
                 Place::Between,
                 format!("state:{first}"),
-                format!("where {} drives {first}", source.name),
-                Target::SymbolIn(source.name.clone(), driven.clone()),
+                format!("where {signal} drives {first}"),
+                Target::SymbolIn(source.to_owned(), driven.clone(), others),
             );
-            slot.offer(self.simulation, "u", Expr::symbol(&source.name));
+            slot.offer(self.simulation, "u", signal);
             slot.context =
                 driven.iter().filter_map(|d| self.simulation.state(d)).map(|s| s.derivative.clone()).collect();
             slots.push(slot);
         }
         slots
+    }
+
+    /// How much of the state `other` enters for each unit of `source`, where both enter the derivatives of these states linearly and in
+    /// the same proportion.
+    fn proportion(&self, source: &str, other: &str, states: &[String]) -> Option<Expr> {
+        let mut shares = states.iter().map(|name| {
+            let derivative = &self.simulation.state(name)?.derivative;
+            let coefficient = |symbol: &str| linear_coefficient(self.simulation, derivative, symbol);
+            Some(quotient(coefficient(other)?, coefficient(source)?))
+        });
+        let first = shares.next()??;
+        shares.all(|s| s.as_ref() == Some(&first)).then_some(first)
     }
 
     /// A measured quantity has the unit that its column's name ends in.

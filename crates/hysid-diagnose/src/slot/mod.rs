@@ -6,7 +6,8 @@
 //! law can stand between them. A state without a partner whose unit is a speed is a velocity without its displacement; any
 //! other is a store. A simulation without states is a static relation: its force laws stand at the output, over the inputs
 //! that are a displacement or a velocity by their unit or name (where there is only a displacement, the velocity is `d(x)`).
-//! Where one part of a simulation drives another and nothing comes back, what it passes on is an input of the second.
+//! Where one part of a simulation drives another and nothing comes back, what it passes on is an input of the second; where that is a sum
+//! of several states, the sum is.
 
 mod algebra;
 mod find;
@@ -55,8 +56,9 @@ pub(crate) enum Target {
     Output(String),
     /// Replaces this symbol in every equation.
     Symbol(String),
-    /// Replaces this symbol in the derivatives of these states.
-    SymbolIn(String, Vec<String>),
+    /// Replaces this symbol in the derivatives of these states. Where the signal is a sum, the expression is what it holds besides the
+    /// symbol.
+    SymbolIn(String, Vec<String>, Option<Expr>),
 }
 
 /// A place of a simulation at which a mechanism can stand.

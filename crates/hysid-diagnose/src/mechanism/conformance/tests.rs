@@ -1,4 +1,5 @@
 use super::*;
+use crate::slot::Place;
 
 #[test]
 fn every_specimen_can_be_read() {
@@ -70,13 +71,14 @@ fn the_form_holds_on_the_simulations_of_the_recordings() {
 #[test]
 fn a_mechanism_is_recovered_from_its_own_simulation() {
     let benches = benches();
-    let check = |title: &str, id: &str| {
+    let check_at = |title: &str, id: &str, place: usize| {
         let bench = benches.iter().find(|b| b.title().starts_with(title)).unwrap();
         let mechanism = crate::mechanism::mechanism(id).unwrap();
-        let (slot, signals) = bench.slots(mechanism).into_iter().next().unwrap();
+        let (slot, signals) = bench.slots(mechanism).into_iter().nth(place).unwrap();
         let left = bench.recovery(mechanism, &slot, &signals).unwrap();
         assert!(left < 0.02, "{id} at {slot} of {title}: {left} of the effect is left");
     };
+    let check = |title: &str, id: &str| check_at(title, id, 0);
     check("Oscillator", "coulomb_friction");
     check("Oscillator", "cubic_stiffness");
     check("Oscillator", "bouc_wen");
@@ -85,4 +87,43 @@ fn a_mechanism_is_recovered_from_its_own_simulation() {
     check("Motor", "delay");
     check("Tank", "abrupt_change");
     check("Circuit", "input_saturation");
+    // Between the two filters.
+    check_at("Circuit", "input_saturation", 1);
+}
+
+#[test]
+fn what_a_part_passes_on_is_one_signal_however_many_states_it_is_made_of() {
+    let check = |derivative: &str, expected: &[&str]| {
+        let text = format!(
+            "title = \"Lead and lag\"\n[inputs]\nu = \"u_V\"\n[parameters]\nw = {{ value = 50.0, min = 1.0, max = 500.0, unit = \"rad/s\" }}\n\
+             T = {{ value = 0.01, min = 0.0, max = 1.0, unit = \"s\" }}\n[time]\nperiod_s = 0.001\n[states]\n\
+             p = {{ derivative = \"r\", initial = 0.0, unit = \"V\" }}\n\
+             r = {{ derivative = \"w^2*(u - p) - w*r\", initial = 0.0, unit = \"V/s\" }}\n\
+             q = {{ derivative = \"{derivative}\", initial = 0.0, unit = \"V\" }}\n[outputs]\ny_V = \"q\"\n"
+        );
+        let simulation = Simulation::parse(&text, "lead.sim.toml").unwrap();
+        let structure = Structure::of(&simulation);
+        let between = structure.slots.iter().filter(|s| s.place == Place::Between);
+        let found: Vec<String> = between.map(|s| s.quantity("u").unwrap().expression.to_string()).collect();
+        assert_eq!(found, expected, "{derivative}");
+        for slot in structure.slots.iter().filter(|s| s.place == Place::Between) {
+            let signals = example_signals(&simulation, slot);
+            let mechanism = crate::mechanism::mechanism("input_polynomial").unwrap();
+            assert_eq!(check_form(mechanism, &simulation, slot, &signals), []);
+            let written = mechanism.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap().simulation;
+            let run = |s: &Simulation| {
+                let compiled = hysid_plant::Compiled::new(s).unwrap();
+                let input: Vec<f64> = (0..200).map(|n| (0.1 * f64::from(n)).sin()).collect();
+                let drive = hysid_plant::Drive::new(0.0, 0.001, 200, vec![input]).unwrap();
+                compiled.simulate(&hysid_plant::Run::new(&drive, &compiled.theta())).outputs.concat()
+            };
+            // Without amplitude it is the simulation as it was.
+            let apart = run(&simulation).iter().zip(run(&written)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-12, "{derivative}: {apart}");
+        }
+    };
+    check("w*(p - q)", &["p"]);
+    check("w*(p + T*r - q)", &["p + T*r"]);
+    check("w*(p - T*r - q)", &["p - T*r"]);
+    check("w*(p - q) + w*T*abs(r)", &["p", "r"]);
 }

@@ -10,9 +10,16 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     block: Block::Input,
     places: &[Place::Input, Place::Between],
     applies: anywhere,
-    already: &["max(min(u, P), Q)", "min(max(u, P), Q)"],
-    law: |_, purpose| {
+    already: &["max(min(u, P), Q)", "min(max(u, P), Q)", "u - P*max(u - Q, 0)"],
+    law: |slot, purpose| {
         let level = Grid::Quantiles("u", vec![0.5, 0.65, 0.8, 0.9, 0.95, 0.99]);
+        if slot.place == Place::Between {
+            // A stage inside a circuit or a drive train rarely cuts alike on both sides, or off: a diode bends one side only.
+            return Law::replace("u - a_p*max(u - s, 0) - a_n*min(u + s, 0)")
+                .amplitude("a_p", "1", -1.0, 1.2)
+                .amplitude("a_n", "1", -1.0, 1.2)
+                .shape("s", "u", level);
+        }
         match purpose {
             Purpose::Screening => {
                 Law::replace("u + w*(max(min(u, s), -s) - u)").weight().shape("s", "u", level).searched()
