@@ -18,7 +18,8 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
             return Law::replace("u - a_p*max(u - s, 0) - a_n*min(u + s, 0)")
                 .amplitude("a_p", "1", -1.0, 1.2)
                 .amplitude("a_n", "1", -1.0, 1.2)
-                .shape("s", "u", level);
+                .shape("s", "u", level)
+                .searched();
         }
         match purpose {
             Purpose::Screening => {
