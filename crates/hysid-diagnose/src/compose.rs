@@ -41,7 +41,7 @@ fn include<'c>(list: &mut Vec<&'c Candidate>, c: &'c Candidate) {
 /// Whether two mechanisms are easily taken for each other.
 fn rivals(a: &Mechanism, b: &Mechanism) -> bool {
     let names = |a: &Mechanism, b: &Mechanism| a.contains.contains(&b.id) || a.confusable.contains(&b.id);
-    a.family == b.family || names(a, b) || names(b, a)
+    a.family == b.family || a.family.twin() == Some(b.family) || names(a, b) || names(b, a)
 }
 
 /// Rivals that are heard at other slots than that of the effect whose rivals they are.
@@ -97,8 +97,8 @@ pub const LEAST_GAIN: f64 = 4.0;
 
 /// Pairs of the evidence space that are tried by simulation, and those of them that are fitted to the end.
 const PAIRS: (usize, usize) = (10, 4);
-/// Rounds of drops and swaps.
-const ROUNDS: usize = 2;
+/// Most rounds of drops and swaps: one may bring another best set, whose members have other rivals.
+const ROUNDS: usize = 4;
 
 /// Pairs of candidates of the simulation without effects, fitted together.
 pub fn superposed<'d>(

@@ -5,12 +5,13 @@ use crate::budget::Step;
 use crate::evidence::SurrogateTest;
 use crate::file::finite;
 use crate::file::{CorrectionRecord, RemainingRecord};
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, block_score};
 use crate::openset::OpenSet;
 use crate::records::noise_floor;
 use crate::search::Search;
 use crate::second_look::{ODDS_AGAINST_MORE, unlikely};
 use crate::verdict::{FIRM, Support};
+use crate::weigh::better_by_chance;
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
@@ -69,6 +70,31 @@ impl Left {
         let Some(remaining) = remaining else { return helps };
         let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
         self.foreign || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
+    }
+
+    /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
+    /// evidence. `None` where it does not predict blocks that it was not fitted to better than the simulation as it is.
+    pub fn modelled<'d>(
+        &self,
+        search: &Search<'_, 'd>,
+        pool: &[Hypothesis<'d>],
+        winner: usize,
+    ) -> Option<Hypothesis<'d>> {
+        let setting = search.setting;
+        let instead = if winner > 0 { search.open(&pool[0]) } else { None };
+        let best = [(winner, self.open.as_ref()), (0, instead.as_ref())]
+            .into_iter()
+            .filter_map(|(i, open)| {
+                let parent = &pool[i];
+                let written = open?.written.as_ref()?;
+                let base =
+                    setting.fit(written, &parent.base.values(), Some(&parent.base.whitener), 2, setting.iterations)?;
+                Some(setting.hypothesis(parent.effects.clone(), base))
+            })
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let (_, before) = block_score(setting, &pool[0])?;
+        let (_, after) = block_score(setting, &best)?;
+        (better_by_chance(&before, &after)? < self.alpha).then_some(best)
     }
 
     /// The correction, where it models something that is left and helps where it was not fitted.

@@ -345,22 +345,31 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if significant && file.verdict == VerdictKind::NoSignificantMismatch {
         file.notes.push("simulation and recording differ by more than the surrogates do, but no effect and no generic term explains it: nothing is claimed".into());
     }
-    if left.foreign && !vetoed && budget.unfinished() {
+    let modelled = if file.verdict == VerdictKind::NotInCatalogue {
+        (hooks.progress)("writing the correction into the simulation");
+        left.modelled(search, &pool, winner)
+    } else {
+        None
+    };
+    if modelled.is_some() {
+        file.notes.push("the augmented simulation holds the sparse correction, refitted, and no physics that has a name: it predicts blocks of the recordings that it was not fitted to better, and says nothing outside their range".into());
+    } else if left.foreign && !vetoed && budget.unfinished() {
         file.notes.push("generic terms explain far more than the effects that were fitted in time; no augmented simulation is written".into());
     } else if left.foreign && !vetoed {
         file.notes.push("the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input".into());
     }
-    let written = winner > 0 && !vetoed && !left.foreign;
+    let named = (winner > 0 && !vetoed && !left.foreign).then_some(best);
+    let written = modelled.as_ref().or(named);
     file.correction = left.believed();
 
     recalibrate(&mut file);
 
     (hooks.progress)("scoring on the hold-out");
-    let augmented = written.then(|| best.base.document());
+    let augmented = written.map(|h| h.base.document());
     let before = free_run(&baseline, &held, &setting.own_states, setting.substeps);
     let after = augmented.as_ref().and_then(|a| free_run(a, &held, &setting.own_states, setting.substeps));
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());
-    file.calibrated_parameters = calibrated(&best.base, simulation);
+    file.calibrated_parameters = calibrated(&modelled.as_ref().unwrap_or(best).base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
     for e in &best.effects {
         let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label);

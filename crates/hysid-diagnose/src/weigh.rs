@@ -1,5 +1,7 @@
 //! Weighing fitted hypotheses: evidence, blocks that were held out of the fit, and what a law that contains another must pay.
 
+use std::f64::consts::TAU;
+
 use rayon::prelude::*;
 
 use crate::base::Base;
@@ -128,6 +130,37 @@ fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
     kinds(a) == kinds(b)
 }
 
+/// How much of the price of its further parameters a set pays too much that contains another as a special case.
+///
+/// Half of `ln n` is right for a parameter that the recording settles as well as one of its samples times the number of samples. A power or
+/// a speed that hardly shows is settled far worse, and that it may have any value then says nothing against it: its price is the logarithm of
+/// how many times its interval goes into what was allowed beforehand (Laplace's approximation), for those that are settled worst.
+fn overpriced(general: &Hypothesis<'_>, special: &Hypothesis<'_>) -> f64 {
+    let price = |h: &Hypothesis<'_>| h.base.log_likelihood - h.log_evidence;
+    let further = general.base.model.unknowns().len().saturating_sub(special.base.model.unknowns().len());
+    let paid = price(general) - price(special);
+    if further == 0 || paid <= 0.0 {
+        return 0.0;
+    }
+    let unit = paid / further as f64;
+    let base = &general.base;
+    let covariance = base.covariance();
+    let mut prices: Vec<f64> = general
+        .effects
+        .iter()
+        .flat_map(|e| e.written.widths())
+        .filter_map(|(name, width)| {
+            let place = base.model.place_of(&name)?;
+            let variance = covariance[place * (base.fit.theta.len() + 1)];
+            let times = if variance > 0.0 { width / (TAU * variance).sqrt() } else { 1.0 };
+            // At a bound the law is the special case or stretched: nothing was settled badly.
+            (!base.fit.at_bound[place]).then(|| times.max(1.0).ln().min(unit))
+        })
+        .collect();
+    prices.sort_by(f64::total_cmp);
+    prices.iter().take(further).map(|price| unit - price).sum()
+}
+
 /// Logarithms of the weights of the hypotheses.
 ///
 /// Evidence counts with `weight`; what the held-out blocks say is part of it. A law that contains the winner's as a special case and gains
@@ -144,18 +177,24 @@ pub fn log_weights(
     pool.iter()
         .enumerate()
         .map(|(i, h)| {
-            let mut log = weight * weighed[i].log_evidence;
+            let contains = i != winner
+                && h.effects.len() == best.effects.len()
+                && h.effects
+                    .iter()
+                    .any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
+            let behind = (h.log_evidence - best.log_evidence).min(0.0);
+            // What it trails by for its price alone; no set becomes likelier than the winner by it.
+            let refund = if contains && siblings(h, best) { overpriced(h, best).min(-behind) } else { 0.0 };
+            let behind = behind + refund;
+            let mut log = weight * (weighed[i].log_evidence + refund);
             if let (Some(own), Some(best)) = (&blocks[i], best_block) {
                 log += 0.5 * weight * (own.0 - best).clamp(-10.0, 10.0);
             }
             if i != winner && siblings(h, best) {
-                log = log.max(log + (SIBLING_WEIGHT - weight) * (h.log_evidence - best.log_evidence).min(0.0));
+                log = log.max(log + (SIBLING_WEIGHT - weight) * behind);
             }
-            let gain = h.base.log_likelihood - best.base.log_likelihood;
-            let contains =
-                h.effects.iter().any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
-            if i != winner && h.effects.len() == best.effects.len() && contains && gain < NESTED_GAIN {
-                log += (NESTED_WEIGHT - weight).max(0.0) * (h.log_evidence - best.log_evidence).min(0.0);
+            if contains && h.base.log_likelihood - best.base.log_likelihood < NESTED_GAIN {
+                log += (NESTED_WEIGHT - weight).max(0.0) * behind;
             }
             log
         })

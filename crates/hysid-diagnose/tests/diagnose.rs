@@ -148,6 +148,9 @@ fn a_law_that_the_catalogue_does_not_have_is_not_given_a_firm_name() {
     assert!(d.file.effects.iter().all(|e| e.family_probability < 0.9), "{:?}", d.file.effects);
     let correction = d.file.correction.expect("generic terms model it");
     assert!(correction.ratio.unwrap() < 0.97 && correction.slot == "state:v", "{correction:?}");
+    // It stands in the simulation that is written, refitted, and helps on a recording that it never saw.
+    assert!(d.augmented.unwrap().parameter("g").is_some());
+    assert!(d.file.fit[0].ratio.unwrap() < 0.6, "{:?}", d.file.fit);
 }
 
 #[test]

@@ -11,8 +11,10 @@
 
 mod signature;
 mod terms;
+mod written;
 
 use hysid_linalg::Matrix;
+use hysid_plant::Simulation;
 use hysid_select::{Criterion, Options as Selecting, select};
 
 use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
@@ -20,7 +22,8 @@ use crate::data::held_out_blocks;
 use crate::evidence::{Projector, Whitener, dot, norm2};
 use crate::file::{CorrectionRecord, TermRecord};
 use signature::signature;
-use terms::{Term, terms};
+use terms::{Kind, Term, terms};
+use written::with_terms;
 
 /// A correction with what decides whether it is believed.
 #[derive(Debug, Clone)]
@@ -31,6 +34,9 @@ pub struct OpenSet {
     pub block_ratio: f64,
     /// Log evidence that it adds: its terms pay for their coefficients, and for having been chosen out of many.
     pub gain: f64,
+    /// The fitted simulation with the terms in it, not yet refitted; `None` where a term cannot be written, or is a function of the time
+    /// in this recording beside others that are not: such a term mends what the others miss, and says nothing of another recording.
+    pub written: Option<Simulation>,
 }
 
 /// Most terms of a correction.
@@ -80,10 +86,15 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
         .collect();
     let slot = terms[best.terms[0]].slot.clone();
     let signature = signature(base, &terms, &best.left, &best.terms, &best.coefficients);
+    let timed = best.terms.iter().filter(|&&i| terms[i].kind == Kind::Time).count();
+    let with_coefficients = best.terms.iter().map(|&i| &terms[i]).zip(best.coefficients.iter().copied());
+    let written =
+        if timed == 0 || timed == best.terms.len() { with_terms(&base.document(), with_coefficients) } else { None };
     Some(OpenSet {
         record: CorrectionRecord { slot, terms: records, signature, ratio: None },
         block_ratio,
         gain: best.gain,
+        written,
     })
 }
 

@@ -19,6 +19,7 @@ struct Signal {
     slot: String,
     side: &'static str,
     text: String,
+    expression: Option<Expr>,
     kind: Kind,
     series: Series,
 }
@@ -42,6 +43,10 @@ pub enum Kind {
 pub struct Term {
     /// As it is written.
     pub text: String,
+    /// The same over the simulation's own symbols.
+    pub expression: Option<Expr>,
+    /// Where it enters the equations.
+    pub place: Place,
     /// What it is a function of.
     pub kind: Kind,
     /// Where it acts: plant, input or output.
@@ -113,13 +118,16 @@ fn lags(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<(String, Kind, Series
     [300.0, 60.0, 12.0]
         .map(|part| {
             let tau = longest / part;
-            let a = (-data.period_s / tau).exp();
+            let (a, ratio) = ((-data.period_s / tau).exp(), tau / data.period_s);
+            // Exact where the coordinate is linear between samples.
             let left = |s: &Vec<f64>| {
-                let mut w = s.first().copied().unwrap_or(0.0);
+                let (mut before, mut behind) = (s.first().copied().unwrap_or(0.0), 0.0);
                 s.iter()
                     .map(|v| {
-                        w = a * w + (1.0 - a) * v;
-                        v - w
+                        let settled = (v - before) * ratio;
+                        behind = settled + a * (behind - settled);
+                        before = *v;
+                        behind
                     })
                     .collect()
             };
@@ -177,10 +185,21 @@ fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>])) -> Vec<(Str
     out
 }
 
+/// Smallest and largest value.
+fn range(x: &[Vec<f64>]) -> (f64, f64) {
+    x.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
+}
+
 /// Largest less smallest value.
 fn spread(x: &[Vec<f64>]) -> f64 {
-    let (low, high) = x.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (low, high) = range(x);
     if high > low { high - low } else { 0.0 }
+}
+
+/// A coordinate, held at the ends of the range that its series has.
+fn held_beyond(coordinate: &Expr, x: &[Vec<f64>]) -> Option<Expr> {
+    let (low, high) = range(x);
+    Expr::parse(&format!("min(max({coordinate}, {}), {})", number(low), number(high))).ok()
 }
 
 /// The generic terms of a fitted simulation, as responses in the unit of the outputs.
@@ -240,6 +259,12 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let Some(mut series) = along(base, &expressions) else { continue };
         let inputs: Vec<(&str, Series)> =
             inputs.iter().map(|u| u.symbol.as_str()).zip(series.split_off(coordinates.len())).collect();
+        // Beyond what was seen of a coordinate a term says nothing: there it stays as it is at the end of the range.
+        let Some(within) =
+            coordinates.iter().zip(&series).map(|(c, x)| held_beyond(&c.1, x)).collect::<Option<Vec<_>>>()
+        else {
+            continue;
+        };
         let mut found: Vec<(String, Kind, Series)> = Vec::new();
         for ((name, _, velocity), x) in coordinates.iter().zip(&series) {
             found.extend(shapes(name, x, *velocity));
@@ -255,10 +280,15 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         if let ([(a, _, _), (b, _, _)], [x, v], true) = (coordinates.as_slice(), series.as_slice(), plant) {
             found.extend(surface((a, x), (b, v)));
         }
+        let in_symbols = |text: &str| {
+            let parsed = Expr::parse(text).ok()?;
+            Some(coordinates.iter().zip(&within).fold(parsed, |e, ((name, _, _), within)| e.substitute(name, within)))
+        };
         work.extend(found.into_iter().map(|(text, kind, series)| Signal {
             place,
             slot: label.clone(),
             side,
+            expression: in_symbols(&text),
             text,
             kind,
             series,
@@ -274,7 +304,8 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
     work.into_iter()
         .zip(columns)
         .filter_map(|(s, column)| {
-            Some(Term { text: s.text, kind: s.kind, side: s.side, slot: s.slot, column: column? })
+            let Signal { text, expression, place, kind, side, slot, .. } = s;
+            Some(Term { text, expression, place, kind, side, slot, column: column? })
         })
         .collect()
 }

@@ -271,20 +271,6 @@ impl Fit {
         }
         covariance
     }
-
-    /// `ln |J' J|` of the whitened Jacobian over the parameters that are not at a bound, and their number.
-    pub fn log_information(&self, layout: &Layout, whitener: &Whitener, scales: &[f64]) -> (f64, usize) {
-        let columns: Vec<Vec<f64>> = self.jacobian.iter().map(|c| whitener.apply(layout, c)).collect();
-        let free: Vec<usize> =
-            (0..self.theta.len()).filter(|&i| !self.at_bound[i] && norm2(&columns[i]) > 0.0).collect();
-        let m = free.len();
-        let gram = DMatrix::from_fn(m, m, |a, b| {
-            dot(&columns[free[a]], &columns[free[b]]) * scales[free[a]] * scales[free[b]]
-        });
-        let log =
-            gram.cholesky().map_or(f64::NEG_INFINITY, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
-        (log, m)
-    }
 }
 
 #[cfg(test)]
