@@ -132,14 +132,16 @@ fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
 
 /// How much of the price of its further parameters a set pays too much that contains another as a special case.
 ///
-/// Half of `ln n` is right for a parameter that the recording settles as well as one of its samples times the number of samples. A power or
-/// a speed that hardly shows is settled far worse, and that it may have any value then says nothing against it: its price is the logarithm of
-/// how many times its interval goes into what was allowed beforehand (Laplace's approximation), for those that are settled worst.
+/// Half of `ln n` is right for a parameter that the recording settles as well as one of its samples times the number of samples. A power that
+/// hardly shows is settled far worse, and that it may have any value then says nothing against it: its price is the logarithm of
+/// how many times its interval goes into what was allowed beforehand (Laplace's approximation), for those that are settled worst. A further
+/// amplitude is another matter: the recording settles that it is zero.
 fn overpriced(general: &Hypothesis<'_>, special: &Hypothesis<'_>) -> f64 {
+    let amplitudes = |h: &Hypothesis<'_>| h.effects.iter().map(|e| e.written.amplitudes.len()).sum::<usize>();
     let price = |h: &Hypothesis<'_>| h.base.log_likelihood - h.log_evidence;
     let further = general.base.model.unknowns().len().saturating_sub(special.base.model.unknowns().len());
     let paid = price(general) - price(special);
-    if further == 0 || paid <= 0.0 {
+    if further == 0 || paid <= 0.0 || amplitudes(general) != amplitudes(special) {
         return 0.0;
     }
     let unit = paid / further as f64;

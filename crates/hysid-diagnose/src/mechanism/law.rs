@@ -280,6 +280,19 @@ impl Law {
         self
     }
 
+    /// A pure number that follows the displacement and relaxes over this much of it: the rate with the velocity in it, over the displacement.
+    ///
+    /// Where a sample's travel is twice that or more, the state relaxes over half of it: faster than that no integration with a step follows,
+    /// and no sample shows. Near a reversal, where the law is seen, it stands as it is.
+    #[must_use]
+    pub fn relaxing(self, name: &str, rate: &str, over: &str) -> Self {
+        self.constant("s_h", "h", Grid::Values(vec![0.5])).silent().state(
+            name,
+            "1",
+            format!("({rate})/max({over}, s_h*abs(v))"),
+        )
+    }
+
     /// The last state starts as the state behind `symbol`.
     #[must_use]
     pub fn starting_like(mut self, symbol: &'static str) -> Self {

@@ -84,8 +84,7 @@ mod tests {
             };
             // As far as the oscillator moves by a hundredth of what it does.
             let g = 0.01 * (norm2(&data.y) / norm2(&term.column).max(f64::MIN_POSITIVE)).sqrt();
-            let slope: Vec<f64> =
-                response(g).iter().zip(response(-g)).map(|(a, b)| (a - b) / (2.0 * g)).collect();
+            let slope: Vec<f64> = response(g).iter().zip(response(-g)).map(|(a, b)| (a - b) / (2.0 * g)).collect();
             let cosine = dot(&slope, &term.column) / (norm2(&slope) * norm2(&term.column)).sqrt();
             let size = (norm2(&slope) / norm2(&term.column)).sqrt();
             assert!(cosine > 0.98 && (size - 1.0).abs() < 0.06, "{} at {}: {cosine} {size}", term.text, term.slot);

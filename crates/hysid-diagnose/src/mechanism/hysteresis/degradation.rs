@@ -16,7 +16,7 @@ pub static DEGRADATION: Mechanism = Mechanism {
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
             .within(0.02, 20.0)
-            .at_least(0.8, "v*h")
+            .at_least(0.2, "v*h")
             .shape("d_A", "x/(v*T)", Grid::Values(vec![0.5]))
             .within(0.0, 20.0)
             .shape("d_nu", "x/(v*T)", Grid::Values(vec![0.5]))
@@ -25,11 +25,7 @@ pub static DEGRADATION: Mechanism = Mechanism {
             .within(0.0, 20.0)
             .shape("b", "1", Grid::Values(vec![0.5]))
             .within(0.3, 5.0)
-            .state(
-                "z",
-                "1",
-                "(max(1 - d_A*e, 0.05)*v - (1 + d_nu*e)*(b*abs(v)*z + (1 - b)*v*abs(z)))/((1 + d_eta*e)*x_y)",
-            )
+            .relaxing("z", "max(1 - d_A*e, 0.05)*v - (1 + d_nu*e)*(b*abs(v)*z + (1 - b)*v*abs(z))", "(1 + d_eta*e)*x_y")
             .state("e", "1", "max(z*v, 0)/x_y")
             .report("k_h", "F/x", "F_h/x_y")
     },

@@ -16,7 +16,7 @@ pub static PINCHING: Mechanism = Mechanism {
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
             .within(0.02, 20.0)
-            .at_least(0.8, "v*h")
+            .at_least(0.2, "v*h")
             .shape("zeta_1", "1", Grid::Values(vec![0.6]))
             .within(0.0, 0.97)
             .shape("zeta_2", "1", Grid::Values(vec![0.2, 0.5]))
@@ -25,7 +25,7 @@ pub static PINCHING: Mechanism = Mechanism {
             .within(-0.5, 0.9)
             .shape("b", "1", Grid::Values(vec![0.5]))
             .within(0.3, 5.0)
-            .state("z", "1", "(1 - zeta_1*exp(-((z*sign(v) - q_z)/zeta_2)^2))*(v - b*abs(v)*z - (1 - b)*v*abs(z))/x_y")
+            .relaxing("z", "(1 - zeta_1*exp(-((z*sign(v) - q_z)/zeta_2)^2))*(v - b*abs(v)*z - (1 - b)*v*abs(z))", "x_y")
             .report("k_h", "F/x", "F_h/x_y")
     },
     contains: &["bouc_wen", "dahl_friction"],

@@ -16,8 +16,8 @@ pub static DAHL_FRICTION: Mechanism = Mechanism {
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.02, 1.0, 5))
             .within(0.005, 5.0)
-            .at_least(0.6, "v*h")
-            .state("z", "1", "(v - abs(v)*z)/z_s")
+            .at_least(0.15, "v*h")
+            .relaxing("z", "v - abs(v)*z", "z_s")
             .report("sigma_0", "F/x", "F_c/z_s")
     },
     contains: &["coulomb_friction"],

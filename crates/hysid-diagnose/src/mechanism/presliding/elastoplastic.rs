@@ -16,10 +16,10 @@ pub static ELASTOPLASTIC_FRICTION: Mechanism = Mechanism {
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.03, 1.0, 4))
             .within(0.005, 5.0)
-            .at_least(0.6, "v*h")
+            .at_least(0.15, "v*h")
             .shape("z_b", "1", Grid::Values(vec![0.3, 0.7]))
             .within(0.0, 0.95)
-            .state("z", "1", "(v - abs(v)*z*step(v*z)*(1 - cos(pi*max(0, min(1, (abs(z) - z_b)/(1 - z_b)))))/2)/z_s")
+            .relaxing("z", "v - abs(v)*z*step(v*z)*(1 - cos(pi*max(0, min(1, (abs(z) - z_b)/(1 - z_b)))))/2", "z_s")
             .report("sigma_0", "F/x", "F_c/z_s")
     },
     contains: &["coulomb_friction"],

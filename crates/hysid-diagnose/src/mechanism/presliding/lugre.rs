@@ -12,11 +12,11 @@ pub static LUGRE_FRICTION: Mechanism = Mechanism {
     applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
     already: &[],
     law: |_, _| {
-        Law::force("F_c*(z + t_1*(v - abs(v)*z/(1 + r_s*exp(-(v/v_s)^2)))/z_s)")
+        Law::force("F_c*(z + t_1*(v - abs(v)*z/(1 + r_s*exp(-(v/v_s)^2)))/max(z_s, s_h*abs(v)))")
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.03, 0.5, 3))
             .within(0.005, 5.0)
-            .at_least(0.6, "v*h")
+            .at_least(0.15, "v*h")
             .shape("v_s", "v", log_grid(0.03, 0.5, 2))
             .within(0.005, 5.0)
             .shape("r_s", "1", Grid::Values(vec![0.5]))
@@ -25,7 +25,7 @@ pub static LUGRE_FRICTION: Mechanism = Mechanism {
             .shape("t_1", "x/v", Grid::Values(vec![0.02]))
             .within(0.0, 1.0)
             .silent()
-            .state("z", "1", "(v - abs(v)*z/(1 + r_s*exp(-(v/v_s)^2)))/z_s")
+            .relaxing("z", "v - abs(v)*z/(1 + r_s*exp(-(v/v_s)^2))", "z_s")
             .report("F_s", "F", "F_c*(1 + r_s)")
             .report("sigma_0", "F/x", "F_c/z_s")
             .report("sigma_1", "F*t/x", "F_c*t_1/z_s")
