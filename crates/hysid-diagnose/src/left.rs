@@ -15,6 +15,9 @@ use crate::weigh::better_by_chance;
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
+/// Probability of so much better a prediction of the blocks by chance, below which a correction is written into the simulation. The evidence
+/// has found it by then; the blocks only have to bear it out.
+const BY_CHANCE: f64 = 0.05;
 /// Share of a set's evidence that generic terms may add to it, and log evidence by which they may beat it alone, before it is an imitation.
 /// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
 const AS_MUCH: f64 = 0.5;
@@ -94,7 +97,7 @@ impl Left {
             .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
         let (_, before) = block_score(setting, &pool[0])?;
         let (_, after) = block_score(setting, &best)?;
-        (better_by_chance(&before, &after)? < self.alpha).then_some(best)
+        (better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
     }
 
     /// The correction, where it models something that is left and helps where it was not fitted.
