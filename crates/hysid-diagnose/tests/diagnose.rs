@@ -143,14 +143,16 @@ fn a_hum_is_found_although_a_noise_model_would_swallow_it() {
 
 #[test]
 fn a_law_that_the_catalogue_does_not_have_is_not_given_a_firm_name() {
-    let d = diagnosed(900, |x, v| 1.2 * v * (40.0 * x).sin());
+    // Damping that rises and falls with the position and never drives.
+    let d = diagnosed(900, |x, v| 1.2 * v * (1.0 + (40.0 * x).sin()));
     assert_eq!(d.file.verdict, VerdictKind::NotInCatalogue, "{} {:?}", d.file.summary, d.file.remaining);
     assert!(d.file.effects.iter().all(|e| e.family_probability < 0.9), "{:?}", d.file.effects);
     let correction = d.file.correction.expect("generic terms model it");
     assert!(correction.ratio.unwrap() < 0.97 && correction.slot == "state:v", "{correction:?}");
     // It stands in the simulation that is written, refitted, and helps on a recording that it never saw.
-    assert!(d.augmented.is_some_and(|a| a.parameter("g").is_some()), "{correction:?} {:?}", d.file.notes);
-    assert!(d.file.fit[0].ratio.unwrap() < 0.6, "{:?}", d.file.fit);
+    let text = d.augmented.map(|a| a.to_toml()).unwrap_or_default();
+    assert!(text.contains("g = {"), "{correction:?} {:?}", d.file.notes);
+    assert!(d.file.fit[0].ratio.unwrap() < 0.8, "{:?} {text}", d.file.fit);
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! The generic signals: functions of displacement and velocity, plays, lags, functions of time, of the input and of the output, each pushed
 //! through the tangent of the fitted simulation from the slot at which it acts.
 
-use hysid_plant::{Expr, Slot as Place};
+use std::sync::Arc;
+
+use hysid_plant::{Expr, Function, Slot as Place};
 use rayon::prelude::*;
 
 use crate::base::Base;
@@ -19,7 +21,7 @@ struct Signal {
     slot: String,
     side: &'static str,
     text: String,
-    expression: Option<Expr>,
+    coordinates: Arc<[(String, Expr)]>,
     kind: Kind,
     series: Series,
 }
@@ -43,8 +45,8 @@ pub enum Kind {
 pub struct Term {
     /// As it is written.
     pub text: String,
-    /// The same over the simulation's own symbols.
-    pub expression: Option<Expr>,
+    /// What the coordinates in the text stand for in the simulation, held at the ends of the range that was seen of them.
+    pub coordinates: Arc<[(String, Expr)]>,
     /// Where it enters the equations.
     pub place: Place,
     /// What it is a function of.
@@ -197,9 +199,9 @@ fn spread(x: &[Vec<f64>]) -> f64 {
 }
 
 /// A coordinate, held at the ends of the range that its series has.
-fn held_beyond(coordinate: &Expr, x: &[Vec<f64>]) -> Option<Expr> {
+fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
     let (low, high) = range(x);
-    Expr::parse(&format!("min(max({coordinate}, {}), {})", number(low), number(high))).ok()
+    Expr::call2(Function::Min, Expr::call2(Function::Max, coordinate, low), high)
 }
 
 /// The generic terms of a fitted simulation, as responses in the unit of the outputs.
@@ -260,11 +262,8 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let inputs: Vec<(&str, Series)> =
             inputs.iter().map(|u| u.symbol.as_str()).zip(series.split_off(coordinates.len())).collect();
         // Beyond what was seen of a coordinate a term says nothing: there it stays as it is at the end of the range.
-        let Some(within) =
-            coordinates.iter().zip(&series).map(|(c, x)| held_beyond(&c.1, x)).collect::<Option<Vec<_>>>()
-        else {
-            continue;
-        };
+        let within: Arc<[(String, Expr)]> =
+            coordinates.iter().zip(&series).map(|(c, x)| (c.0.clone(), held_beyond(c.1.clone(), x))).collect();
         let mut found: Vec<(String, Kind, Series)> = Vec::new();
         for ((name, _, velocity), x) in coordinates.iter().zip(&series) {
             found.extend(shapes(name, x, *velocity));
@@ -280,16 +279,12 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         if let ([(a, _, _), (b, _, _)], [x, v], true) = (coordinates.as_slice(), series.as_slice(), plant) {
             found.extend(surface((a, x), (b, v)));
         }
-        let in_symbols = |text: &str| {
-            let parsed = Expr::parse(text).ok()?;
-            Some(coordinates.iter().zip(&within).fold(parsed, |e, ((name, _, _), within)| e.substitute(name, within)))
-        };
         work.extend(found.into_iter().map(|(text, kind, series)| Signal {
             place,
             slot: label.clone(),
             side,
-            expression: in_symbols(&text),
             text,
+            coordinates: Arc::clone(&within),
             kind,
             series,
         }));
@@ -304,8 +299,8 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
     work.into_iter()
         .zip(columns)
         .filter_map(|(s, column)| {
-            let Signal { text, expression, place, kind, side, slot, .. } = s;
-            Some(Term { text, expression, place, kind, side, slot, column: column? })
+            let Signal { text, coordinates, place, kind, side, slot, .. } = s;
+            Some(Term { text, coordinates, place, kind, side, slot, column: column? })
         })
         .collect()
 }

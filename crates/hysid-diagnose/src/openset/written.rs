@@ -1,4 +1,7 @@
-//! A correction as a simulation: its terms stand in the equations, their coefficients are parameters.
+//! A correction as a simulation: its terms stand in the equations; their coefficients, knees, widths and wave numbers are parameters.
+//!
+//! Regression on the tangent chose the terms out of a coarse grid. A wave number that is a tenth wrong is out of phase at the end of the range,
+//! and what was better on the recording is then worse on another: all of it is refitted.
 
 use hysid_plant::{Expr, Parameter, Simulation, Slot as Place};
 
@@ -6,6 +9,10 @@ use super::terms::Term;
 
 /// How far a coefficient may move from where the regression on the tangent found it, over its own size.
 const REACH: f64 = 10.0;
+/// How far a shape may move, as multiples of where it began.
+const SHAPES: (f64, f64) = (0.5, 2.0);
+/// Numbers that are part of a term's form.
+const FORM: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 
 /// A simulation with these terms, each with its coefficient, where they act; `None` where a term cannot be written over its symbols.
 pub fn with_terms<'t>(simulation: &Simulation, terms: impl IntoIterator<Item = (&'t Term, f64)>) -> Option<Simulation> {
@@ -14,9 +21,9 @@ pub fn with_terms<'t>(simulation: &Simulation, terms: impl IntoIterator<Item = (
     let mut inputs: Vec<Option<Expr>> = vec![None; simulation.inputs.len()];
     for (term, coefficient) in terms {
         let name = written.fresh_symbol("g");
-        let part = Expr::symbol(&name) * term.expression.clone()?;
         let reach = REACH * coefficient.abs();
         written.parameters.push(Parameter::new(&name, coefficient).within(coefficient - reach, coefficient + reach));
+        let part = Expr::symbol(&name) * with_free_shapes(&mut written, term)?;
         match term.place {
             Place::State(i) => {
                 let state = written.states.get_mut(i)?;
@@ -40,6 +47,21 @@ pub fn with_terms<'t>(simulation: &Simulation, terms: impl IntoIterator<Item = (
     Some(written)
 }
 
+/// A term over the simulation's symbols, the numbers in it parameters; exponents, zero and one are part of its form.
+fn with_free_shapes(simulation: &mut Simulation, term: &Term) -> Option<Expr> {
+    let parsed = Expr::parse(&term.text).ok()?;
+    let free = parsed.map(&mut |e| match e {
+        Expr::Number(n) if !FORM.contains(&n) => {
+            let name = simulation.fresh_symbol("s");
+            let (low, high) = (n * SHAPES.0, n * SHAPES.1);
+            simulation.parameters.push(Parameter::new(&name, n).within(low.min(high), low.max(high)));
+            Expr::symbol(&name)
+        }
+        other => other,
+    });
+    Some(term.coordinates.iter().fold(free, |e, (name, meaning)| e.substitute(name, meaning)))
+}
+
 #[cfg(test)]
 #[path = "../../tests/common/oscillator.rs"]
 #[allow(dead_code)]
@@ -51,7 +73,7 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
     use super::*;
-    use crate::base::{NoiseKind, fit_simulation};
+    use crate::base::{NoiseKind, Start, fit_simulation};
     use crate::data::DataSet;
     use crate::evidence::{dot, norm2};
     use crate::model::{Model, Values};
@@ -70,8 +92,16 @@ mod tests {
         let data = DataSet::new(&simulation, &[recording], 3).unwrap();
         let model = |s: &Simulation| Model::new(s, &data, &["x".into(), "v".into()], 2).unwrap();
         let start = Values::default();
-        let base =
-            fit_simulation(model(&simulation), &start, None, 1, LmOptions::default(), NoiseKind::White(1.0)).unwrap();
+        let base = fit_simulation(
+            model(&simulation),
+            Start::Values(&start),
+            &[],
+            None,
+            1,
+            LmOptions::default(),
+            NoiseKind::White(1.0),
+        )
+        .unwrap();
         let all = terms(&base);
         assert!(all.len() > 50, "{}", all.len());
         for term in &all {
