@@ -38,6 +38,12 @@ fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
             out.push(named(p));
         }
     }
+    if let [_, .., last] = candidate.refit.amplitudes.as_slice() {
+        // Beside another the last amplitude may have the wrong sign at zero, where friction that sticks is nothing like its derivative.
+        let mut turned = named(best);
+        turned.iter_mut().filter(|(name, _)| *name == last.name).for_each(|(_, value)| *value = -*value);
+        out.push(turned);
+    }
     if candidate.refit.amplitudes.is_empty() && !candidate.refit.neutral.is_empty() {
         // Only shapes: the effect's strength is in them, and the point's weight says how strong.
         let weight = best.amplitudes.first().map_or(1.0, |a| a.1.clamp(0.05, 1.0));
