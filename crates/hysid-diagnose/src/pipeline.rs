@@ -247,7 +247,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
     let blocks = block_scores(setting, &pool);
     let winner = if significant { tie_broken(&pool, &blocks) } else { 0 };
-    let left = Left::of(&search, &pool, winner, significant);
+    let left = Left::of(search, &pool, winner, significant);
     let probability = likelihoods(&pool, &weighed, &blocks, winner, left.imperfect);
     let mut support = firmness(&pool, &weighed, &probability, winner, left.imperfect);
     // A search that was cut short has not heard all rivals.
@@ -291,7 +291,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             .filter(|e| e.mechanism == "abrupt_change")
             .find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"));
         if let (Some(l), Some(moment), Some(last)) =
-            (&mut file.location, moment, data.stretches.iter().filter(|s| s.recording == 0).next_back())
+            (&mut file.location, moment, data.stretches.iter().rfind(|s| s.recording == 0))
         {
             l.time_s = vec![[moment.value, last.start_s + last.len() as f64 * data.period_s]];
         }

@@ -188,10 +188,10 @@ impl Factor {
             if j == removed || self.energy[j] <= 0.0 {
                 continue;
             }
-            if let Some(s) = score(self.energy[j] + b * b, self.cross[j] + b * gain, guard) {
-                if best.is_none_or(|(_, t)| s > t) {
-                    best = Some((j, s));
-                }
+            if let Some(s) = score(self.energy[j] + b * b, self.cross[j] + b * gain, guard)
+                && best.is_none_or(|(_, t)| s > t)
+            {
+                best = Some((j, s));
             }
         }
         best

@@ -157,10 +157,11 @@ fn grow<E: Evidence + ?Sized>(
         factor.add(next, moments.column(next));
         let Some(table) = report.as_deref_mut() else { continue };
         note_rejected(table, moments, &factor, options.pivot_guard);
-        if let Criterion::ErrTolerance(rho) = options.criterion {
-            if factor.sse() <= rho && factor.chosen.len() >= options.forced.len() {
-                break;
-            }
+        if let Criterion::ErrTolerance(rho) = options.criterion
+            && factor.sse() <= rho
+            && factor.chosen.len() >= options.forced.len()
+        {
+            break;
         }
         if factor.chosen.len() == next_look && options.criterion.has_minimum() {
             // A look costs a refit of the whole path: the further it has come, the rarer.
@@ -250,12 +251,12 @@ fn settle<E: Evidence + ?Sized>(moments: &mut Moments<'_, E>, options: &Options,
         exchange(moments, &mut factor, fixed, guard);
         table.offer(&factor.chosen, factor.sse());
         table.best[at].seen = true;
-        if at + 1 < table.best.len() {
-            if let Some(&j) = factor.best(1, guard).first() {
-                let mut columns = factor.chosen.clone();
-                columns.push(j);
-                table.offer(&columns, factor.sse() - factor.score(j, guard).unwrap_or(0.0));
-            }
+        if at + 1 < table.best.len()
+            && let Some(&j) = factor.best(1, guard).first()
+        {
+            let mut columns = factor.chosen.clone();
+            columns.push(j);
+            table.offer(&columns, factor.sse() - factor.score(j, guard).unwrap_or(0.0));
         }
         if at > fixed.max(1) - 1 && at > 0 {
             let members = factor.members();

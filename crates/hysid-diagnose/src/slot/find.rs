@@ -291,10 +291,10 @@ impl Finder<'_> {
             let moved = self.motions.iter().find(|m| m.derivative.uses(name)).or(self.motions.first());
             if let Some(motion) = moved {
                 slot.offer(self.simulation, "v", Expr::symbol(motion.v));
-            } else if let Some(law) = self.force_laws().first() {
-                if let Some(v) = law.quantity("v") {
-                    slot.offer(self.simulation, "v", v.expression.clone());
-                }
+            } else if let Some(law) = self.force_laws().first()
+                && let Some(v) = law.quantity("v")
+            {
+                slot.offer(self.simulation, "v", v.expression.clone());
             }
             slot.context = self.equations();
             slots.push(slot);

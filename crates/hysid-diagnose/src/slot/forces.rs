@@ -141,10 +141,10 @@ impl Finder<'_> {
                     Target::Output(output.column.clone()),
                 );
                 slot.loops = self.loops(&v);
-                if let Some(v) = velocities.get(i) {
-                    if let Some(c) = linear_coefficient(self.simulation, &output.expression, v) {
-                        slot.offer(self.simulation, "c", c);
-                    }
+                if let Some(v) = velocities.get(i)
+                    && let Some(c) = linear_coefficient(self.simulation, &output.expression, v)
+                {
+                    slot.offer(self.simulation, "c", c);
                 }
                 slot.offer(self.simulation, "v", v);
                 if let Some(x) = x {

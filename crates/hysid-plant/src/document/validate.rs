@@ -132,10 +132,10 @@ impl Simulation {
                     return bad(field, what, value, "a finite number is needed".to_owned());
                 }
             }
-            if let (Some(min), Some(max)) = (p.min, p.max) {
-                if min > max || (min == max && !p.fixed) {
-                    return bad("min", "the lower bound", min, format!("it must be below the upper bound {max}"));
-                }
+            if let (Some(min), Some(max)) = (p.min, p.max)
+                && (min > max || (min == max && !p.fixed))
+            {
+                return bad("min", "the lower bound", min, format!("it must be below the upper bound {max}"));
             }
             if let Some(min) = p.min.filter(|min| p.value < *min) {
                 return bad("value", "the value", p.value, format!("it is below its lower bound {min}"));
@@ -154,10 +154,10 @@ impl Simulation {
         for (key, expr) in self.expressions() {
             let mut bad = None;
             expr.visit(&mut |e| {
-                if let Expr::Number(value) = e {
-                    if !value.is_finite() {
-                        bad = Some(*value);
-                    }
+                if let Expr::Number(value) = e
+                    && !value.is_finite()
+                {
+                    bad = Some(*value);
                 }
             });
             if let Some(value) = bad {

@@ -34,7 +34,7 @@ pub(crate) fn rates(samples: &[Samples], options: &Options) -> (Vec<usize>, Vec<
     let allowed = [2, 3, 5, 8, 10, 15, 20, 30, 50, 80, 100, 150, 200].into_iter().filter(|&l| total / l >= FEWEST);
     for aim in AIMS.into_iter().filter(|aim| *aim > 2.0 * own) {
         // The lowest rate allowed where even that does not reach the aim.
-        found.extend(allowed.clone().find(|&l| step(l) >= aim).or_else(|| allowed.clone().last()));
+        found.extend(allowed.clone().find(|&l| step(l) >= aim).or_else(|| allowed.clone().next_back()));
     }
     found.dedup();
     let why = format!(

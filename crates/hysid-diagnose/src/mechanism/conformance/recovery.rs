@@ -89,10 +89,10 @@ impl Bench {
             if let Some(step) = problem.linear_step(&zero, &linear) {
                 let mut theta = zero;
                 for (i, change) in linear.iter().zip(step) {
-                    if let (Some(value), Some(p)) = (theta.get_mut(*i), parameters.get(*i)) {
-                        if own.contains(&p.name) {
-                            *value = (*value + change).clamp(p.lower(), p.upper());
-                        }
+                    if let (Some(value), Some(p)) = (theta.get_mut(*i), parameters.get(*i))
+                        && own.contains(&p.name)
+                    {
+                        *value = (*value + change).clamp(p.lower(), p.upper());
                     }
                 }
                 tried.push(theta);
