@@ -76,12 +76,14 @@ impl Left {
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
-    /// evidence. `None` where it does not predict blocks that it was not fitted to better than the simulation as it is.
+    /// evidence. `None` where it does not predict blocks that it was not fitted to better than
+    /// what would be written `otherwise`.
     pub fn modelled<'d>(
         &self,
         search: &Search<'_, 'd>,
         pool: &[Hypothesis<'d>],
         winner: usize,
+        otherwise: usize,
     ) -> Option<Hypothesis<'d>> {
         let setting = search.setting;
         let instead = if winner > 0 { search.open(&pool[0]) } else { None };
@@ -95,7 +97,7 @@ impl Left {
                 Some(setting.hypothesis(parent.effects.clone(), base))
             })
             .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-        let (_, before) = block_score(setting, &pool[0])?;
+        let (_, before) = block_score(setting, &pool[otherwise])?;
         let (_, after) = block_score(setting, &best)?;
         (better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
     }

@@ -345,9 +345,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if significant && file.verdict == VerdictKind::NoSignificantMismatch {
         file.notes.push("simulation and recording differ by more than the surrogates do, but no effect and no generic term explains it: nothing is claimed".into());
     }
+    let named = if winner > 0 && !vetoed && !left.foreign { winner } else { 0 };
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {
         (hooks.progress)("writing the correction into the simulation");
-        left.modelled(search, &pool, winner)
+        left.modelled(search, &pool, winner, named)
     } else {
         None
     };
@@ -358,8 +359,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     } else if left.foreign && !vetoed {
         file.notes.push("the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input".into());
     }
-    let named = (winner > 0 && !vetoed && !left.foreign).then_some(best);
-    let written = modelled.as_ref().or(named);
+    let written = modelled.as_ref().or((named > 0).then_some(best));
     file.correction = left.believed();
 
     recalibrate(&mut file);
