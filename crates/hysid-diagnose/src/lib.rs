@@ -2,7 +2,7 @@
 
 pub mod evidence;
 pub mod file;
-pub mod left;
+mod left;
 mod locate;
 pub mod mechanism;
 pub mod picture;
@@ -26,6 +26,7 @@ mod fitting;
 mod force;
 mod hold;
 mod hypothesis;
+mod intake;
 mod joint;
 mod model;
 mod numerics_check;

@@ -6,7 +6,6 @@ use hysid_signal::Recording;
 use crate::base::NoiseKind;
 use crate::budget::{Budget, Step};
 use crate::compose::{add, best_of};
-use crate::data::{DataSet, held_out_blocks};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
 use crate::evidence::correlation_time;
@@ -16,6 +15,7 @@ use crate::firmness::{firmness, likelihoods};
 use crate::force::pushed;
 use crate::hold::free_run;
 use crate::hypothesis::Setting;
+use crate::intake::{Intake, intake};
 use crate::left::Left;
 use crate::picture::Picture;
 use crate::records::*;
@@ -85,46 +85,14 @@ pub struct Diagnosis {
     pub picture: Picture,
 }
 
-/// Most samples that the search works on where the outputs are thinned, and where they are not; a longer recording is used in windows.
-const MOST_SAMPLES: usize = 26_000;
-const MOST_ROWS: usize = 12_000;
-
 /// Diagnoses a simulation.
 ///
 /// # Errors
 /// Bad input; never a numerical event.
 pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, DiagnoseError> {
     let options = request.options;
-    if !(options.alpha > 0.0 && options.alpha < 0.5) {
-        return Err(DiagnoseError::Option {
-            option: "--alpha",
-            given: options.alpha.to_string(),
-            allowed: "above 0 and below 0.5",
-        });
-    }
     let simulation = request.simulation;
-    dead_outputs(request)?;
-    (hooks.progress)("reading the recordings");
-    let free = simulation.parameters.iter().filter(|p| !p.fixed).count();
-    let all = DataSet::new(simulation, request.estimation, free)?;
-    let (full, held) = if request.holdout.is_empty() {
-        split_blocks(&all)
-    } else {
-        if let Some(same) = request
-            .holdout
-            .iter()
-            .find(|h| request.estimation.iter().any(|e| e.channels() == h.channels() && e.clock() == h.clock()))
-        {
-            return Err(DiagnoseError::SameData(same.name().to_owned()));
-        }
-        (all, DataSet::new(simulation, request.holdout, 0)?)
-    };
-    let mut notes = full.notes.clone();
-    if request.holdout.is_empty() {
-        notes.push("no hold-out recording was given: blocks of the recordings were held out and score the fit".into());
-    }
-    let data = full.within(if full.own_step() > 1 { MOST_SAMPLES } else { MOST_ROWS }).thinned();
-    notes.extend(data.notes.iter().filter(|n| !full.notes.contains(n)).cloned());
+    let Intake { data, held, notes } = intake(request, hooks)?;
 
     (hooks.progress)("calibrating the simulation");
     let own_states: Vec<String> = simulation.states.iter().map(|s| s.name.clone()).collect();
@@ -400,35 +368,4 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         noise: &noise,
     });
     Ok(Diagnosis { file, baseline, augmented, picture })
-}
-
-/// An output that nothing moves cannot be diagnosed.
-fn dead_outputs(request: &Request<'_>) -> Result<(), DiagnoseError> {
-    for o in &request.simulation.outputs {
-        let symbols = o.expression.symbols();
-        let alive = symbols.iter().any(|s| {
-            request.simulation.state(s).is_some()
-                || request.simulation.input(s).is_some()
-                || s == "t"
-                || request.simulation.parameter(s).is_some()
-        });
-        if !alive {
-            return Err(DiagnoseError::DeadOutput { file: request.file.to_owned(), column: o.column.clone() });
-        }
-    }
-    Ok(())
-}
-
-/// Blocks of the estimation recordings as hold-out.
-fn split_blocks(all: &DataSet) -> (DataSet, DataSet) {
-    let weights = held_out_blocks(&all.layout, &all.y);
-    let mut out = std::collections::BTreeSet::new();
-    for s in &all.layout.series {
-        for (n, row) in s.rows.clone().enumerate() {
-            if weights[row] == 0.0 {
-                out.insert((s.stretch, s.first + n));
-            }
-        }
-    }
-    (all.keep(|s, n, _| !out.contains(&(s, n))), all.keep(|s, n, _| out.contains(&(s, n))))
 }
