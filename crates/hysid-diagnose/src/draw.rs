@@ -41,7 +41,7 @@ pub(crate) struct Sitting<'a, 'd> {
 
 /// The picture of a diagnosis.
 pub(crate) fn picture(s: &Sitting<'_, '_>) -> Picture {
-    let found = !s.best.effects.is_empty();
+    let found = !std::ptr::eq(s.none, s.best);
     let predicted =
         |base: &Base<'_>| -> Vec<f64> { s.data.y.iter().zip(&base.fit.residual).map(|(y, e)| y - e).collect() };
     let (first, second) = (predicted(&s.none.base), found.then(|| predicted(&s.best.base)));

@@ -361,7 +361,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         simulation,
         data: &data,
         none: &pool[0],
-        best,
+        best: modelled.as_ref().unwrap_or(best),
         held: &held,
         before: before.as_ref(),
         after: after.as_ref(),
