@@ -107,11 +107,11 @@ pub fn superposed<'d>(
     candidates: &[Candidate],
     most: usize,
 ) -> Vec<Hypothesis<'d>> {
-    let (_, r) = none.base.evidence();
-    let own = none.base.values();
     if setting.budget.omits(Step::Fits) {
         return Vec::new();
     }
+    let (_, r) = none.base.evidence();
+    let own = none.base.values();
     let mut sketched: Vec<Hypothesis<'d>> = pairs(candidates, &r, PAIRS.0)
         .par_iter()
         .filter_map(|pair| {

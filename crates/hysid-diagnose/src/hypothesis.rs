@@ -108,9 +108,7 @@ impl<'d> Setting<'d> {
         rounds: usize,
         iterations: usize,
     ) -> Option<Base<'d>> {
-        let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
-        let options = LmOptions { iterations, ..LmOptions::default() };
-        fit_simulation(model, Start::Values(start), &self.pushed, noise, rounds, options, self.noise)
+        self.fit_from(document, Start::Values(start), noise, rounds, iterations)
     }
 
     /// Goes on with a fitted document; the noise model is that given, then its own.
@@ -121,9 +119,20 @@ impl<'d> Setting<'d> {
         rounds: usize,
         iterations: usize,
     ) -> Option<Base<'d>> {
-        let model = Model::new(base.model.simulation(), self.data, &self.own_states, self.substeps).ok()?;
+        self.fit_from(base.model.simulation(), Start::Fit(&base.fit), noise, rounds, iterations)
+    }
+
+    fn fit_from(
+        &self,
+        document: &Simulation,
+        start: Start<'_>,
+        noise: Option<&Whitener>,
+        rounds: usize,
+        iterations: usize,
+    ) -> Option<Base<'d>> {
+        let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
         let options = LmOptions { iterations, ..LmOptions::default() };
-        fit_simulation(model, Start::Fit(&base.fit), &self.pushed, noise, rounds, options, self.noise)
+        fit_simulation(model, start, &self.pushed, noise, rounds, options, self.noise)
     }
 
     /// A fitted document as a hypothesis.

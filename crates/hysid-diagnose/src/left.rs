@@ -76,8 +76,7 @@ impl Left {
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
-    /// evidence. `None` where it does not predict blocks that it was not fitted to better than
-    /// what would be written `otherwise`.
+    /// evidence. `None` where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool).
     pub fn modelled<'d>(
         &self,
         search: &Search<'_, 'd>,

@@ -328,6 +328,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         file.notes.push("the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input".into());
     }
     let written = modelled.as_ref().or((named > 0).then_some(best));
+    let last = modelled.as_ref().unwrap_or(best);
     file.correction = left.believed();
 
     recalibrate(&mut file);
@@ -337,7 +338,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let before = free_run(&baseline, &held, &setting.own_states, setting.substeps);
     let after = augmented.as_ref().and_then(|a| free_run(a, &held, &setting.own_states, setting.substeps));
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());
-    file.calibrated_parameters = calibrated(&modelled.as_ref().unwrap_or(best).base, simulation);
+    file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
     for e in &best.effects {
         let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label);
@@ -361,7 +362,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         simulation,
         data: &data,
         none: &pool[0],
-        best: modelled.as_ref().unwrap_or(best),
+        best: last,
         held: &held,
         before: before.as_ref(),
         after: after.as_ref(),

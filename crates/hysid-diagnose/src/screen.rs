@@ -317,20 +317,3 @@ pub fn rewrite_at(
     let written = mechanism.rewrite(document, &slot, at[place].as_ref()?, Purpose::Refit).ok()?;
     Some((written, slot))
 }
-
-impl Rewritten {
-    /// The names of its amplitudes and shapes, in the order of the law.
-    pub fn parameters_of(&self) -> Vec<String> {
-        self.amplitudes.iter().map(|a| a.name.clone()).chain(self.shapes.iter().map(|s| s.name.clone())).collect()
-    }
-
-    /// What was allowed beforehand: the names of its amplitudes with their natural sizes, of its shapes with the lengths of their grids.
-    pub fn widths(&self) -> Vec<(String, f64)> {
-        let amplitudes = self.amplitudes.iter().map(|a| (a.name.clone(), a.size));
-        let shapes = self.shapes.iter().map(|s| {
-            let ends = (s.grid.first().copied().unwrap_or(0.0), s.grid.last().copied().unwrap_or(0.0));
-            (s.name.clone(), ends.1 - ends.0)
-        });
-        amplitudes.chain(shapes).collect()
-    }
-}

@@ -179,6 +179,7 @@ pub fn log_weights(
     pool.iter()
         .enumerate()
         .map(|(i, h)| {
+            let sibling = i != winner && siblings(h, best);
             let contains = i != winner
                 && h.effects.len() == best.effects.len()
                 && h.effects
@@ -186,13 +187,13 @@ pub fn log_weights(
                     .any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
             let behind = (h.log_evidence - best.log_evidence).min(0.0);
             // What it trails by for its price alone; no set becomes likelier than the winner by it.
-            let refund = if contains && siblings(h, best) { overpriced(h, best).min(-behind) } else { 0.0 };
+            let refund = if contains && sibling { overpriced(h, best).min(-behind) } else { 0.0 };
             let behind = behind + refund;
             let mut log = weight * (weighed[i].log_evidence + refund);
             if let (Some(own), Some(best)) = (&blocks[i], best_block) {
                 log += 0.5 * weight * (own.0 - best).clamp(-10.0, 10.0);
             }
-            if i != winner && siblings(h, best) {
+            if sibling {
                 log = log.max(log + (SIBLING_WEIGHT - weight) * behind);
             }
             if contains && h.base.log_likelihood - best.base.log_likelihood < NESTED_GAIN {

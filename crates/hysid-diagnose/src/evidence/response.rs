@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Change of a gain below which the filter has settled.
 const SETTLED: f64 = 1e-8;
+
 /// The way from a force to one output, from row to row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForcePath {

@@ -4,84 +4,10 @@ use std::collections::BTreeMap;
 
 use hysid_plant::{Expr, Initial, Parameter, Simulation, State, Unit};
 
+use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
-use super::{Change, Grid, Law, Mechanism, Purpose, Role, Start};
+use super::{Change, Law, Mechanism, Purpose, Role, Start};
 use crate::slot::{ForcePath, Slot, Target, force_path};
-
-/// A parameter whose zero is the baseline.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Amplitude {
-    /// Its name in the rewritten simulation.
-    pub name: String,
-    /// Its natural size on this recording, above zero: where the effect is as large as the signals allow.
-    pub size: f64,
-}
-
-/// A parameter that shapes the effect and has no influence while the amplitudes are zero.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Shape {
-    /// Its name in the rewritten simulation.
-    pub name: String,
-    /// The values to try, in ascending order.
-    pub grid: Vec<f64>,
-    /// Whether least squares alone cannot move it.
-    pub searched: bool,
-    /// What of the recording the values were taken from.
-    pub places: Places,
-}
-
-/// What of a recording the values of a shape point to: an effect that is looked for at many places is found at one of them by chance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Places {
-    /// Nothing in particular.
-    Any,
-    /// Moments.
-    Moments,
-    /// Lines of the residual's spectrum.
-    Lines,
-}
-
-impl Places {
-    fn of(grid: &Grid) -> Self {
-        match grid {
-            Grid::Times(_) => Self::Moments,
-            Grid::Peaks(_) => Self::Lines,
-            _ => Self::Any,
-        }
-    }
-}
-
-/// What `diagnosis.json` reports of an effect.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Reported {
-    /// The name in the report.
-    pub name: String,
-    /// The unit, where the simulation settles it.
-    pub unit: Option<Unit>,
-    /// The value, over the parameters of the rewritten simulation.
-    pub value: Expr,
-}
-
-/// A simulation with an effect in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rewritten {
-    /// The simulation; the effect's amplitudes are zero in it, its shapes stand in the middle of their grids.
-    pub simulation: Simulation,
-    /// The parameters whose zero is the baseline. Their signs of plausibility are the bounds in the simulation.
-    pub amplitudes: Vec<Amplitude>,
-    /// The parameters on grids.
-    pub shapes: Vec<Shape>,
-    /// Values at which the simulation is the baseline; empty where no finite value is.
-    pub neutral: Vec<(String, f64)>,
-    /// Whether the equations are linear in the amplitudes.
-    pub linear: bool,
-    /// What is reported.
-    pub report: Vec<Reported>,
-    /// States that were added.
-    pub states: Vec<String>,
-    /// Whether the law is the sum of two others of the catalogue.
-    pub sum_of_others: bool,
-}
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -93,40 +19,6 @@ pub struct RewriteError {
     pub slot: String,
     /// What is wrong.
     pub reason: String,
-}
-
-/// Most joint points of the shape grids.
-const MOST_STARTS: usize = 96;
-
-impl Rewritten {
-    /// Every joint point of the shape grids, as (name, value) pairs; one empty point where there is no shape.
-    ///
-    /// Where there would be more than 96 points the longest grids are thinned first.
-    pub fn starts(&self) -> Vec<Vec<(String, f64)>> {
-        let mut grids: Vec<(String, Vec<f64>)> = self.shapes.iter().map(|s| (s.name.clone(), s.grid.clone())).collect();
-        while grids.iter().map(|(_, g)| g.len().max(1)).product::<usize>() > MOST_STARTS {
-            let Some(longest) = grids.iter_mut().map(|(_, g)| g).max_by_key(|g| g.len()) else { break };
-            *longest = longest.iter().copied().step_by(2).collect();
-        }
-        let mut points = vec![Vec::new()];
-        for (name, grid) in grids {
-            let extended = points.iter().flat_map(|point: &Vec<(String, f64)>| {
-                grid.iter().map(|value| {
-                    let mut point = point.clone();
-                    point.push((name.clone(), *value));
-                    point
-                })
-            });
-            points = extended.collect();
-        }
-        points
-    }
-
-    /// The names of the parameters that the effect brought, fixed ones too.
-    pub fn parameters(&self, baseline: &Simulation) -> Vec<String> {
-        let new = self.simulation.parameters.iter().filter(|p| baseline.parameter(&p.name).is_none());
-        new.map(|p| p.name.clone()).collect()
-    }
 }
 
 /// The law's own names and the names that they have in the simulation.

@@ -64,14 +64,13 @@ fn with_free_shapes(simulation: &mut Simulation, term: &Term) -> Option<Expr> {
 
 #[cfg(test)]
 #[path = "../../tests/common/oscillator.rs"]
-#[allow(dead_code)]
 mod oscillator;
 
 #[cfg(test)]
 mod tests {
     use hysid_signal::{Channel, Clock, Recording};
 
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
+    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::base::{NoiseKind, Start, fit_simulation};
     use crate::data::DataSet;
@@ -113,10 +112,10 @@ mod tests {
                 m.simulate(&theta).0.concat().concat()
             };
             // As far as the oscillator moves by a hundredth of what it does.
-            let g = 0.01 * (norm2(&data.y) / norm2(&term.column).max(f64::MIN_POSITIVE)).sqrt();
+            let g = 0.01 * rms(&data.y) / rms(&term.column).max(f64::MIN_POSITIVE);
             let slope: Vec<f64> = response(g).iter().zip(response(-g)).map(|(a, b)| (a - b) / (2.0 * g)).collect();
             let cosine = dot(&slope, &term.column) / (norm2(&slope) * norm2(&term.column)).sqrt();
-            let size = (norm2(&slope) / norm2(&term.column)).sqrt();
+            let size = rms(&slope) / rms(&term.column);
             assert!(cosine > 0.98 && (size - 1.0).abs() < 0.06, "{} at {}: {cosine} {size}", term.text, term.slot);
         }
     }

@@ -1,10 +1,10 @@
 //! Linear models of growing lags, refined on their free run: they tell the lags and are the yardstick.
 
 use super::IdentifyError;
+use super::compete::PER_TERM;
 use super::desk::Desk;
 use super::family::{Family, linear};
 use super::growth::{Stage, start};
-use super::recipe::PER_TERM;
 
 /// A linear model with its lags.
 #[derive(Debug, Clone)]

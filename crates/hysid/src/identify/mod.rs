@@ -12,6 +12,7 @@
 
 mod blocks;
 mod coloured;
+mod compete;
 mod criterion;
 mod data;
 mod desk;
