@@ -129,7 +129,9 @@ mod tests {
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..1000 }], outputs: 1 };
         let decaying = |from: usize| -> Vec<f64> {
             (0..1000)
-                .map(|i| (i as f64 * 0.7).sin() + if i < from { 0.0 } else { 20.0 * (-((i - from) as f64) / 30.0).exp() })
+                .map(|i| {
+                    (i as f64 * 0.7).sin() + if i < from { 0.0 } else { 20.0 * (-((i - from) as f64) / 30.0).exp() }
+                })
                 .collect()
         };
         let out = |y: &[f64]| -> Vec<usize> {
