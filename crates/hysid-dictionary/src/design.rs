@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hysid_linalg::{Columns, Matrix, Start};
+use hysid_linalg::{Columns, Gram, Matrix, Start};
 
 use crate::kernel::Plan;
 use crate::record::{FIRST_SIGN, differences, next_sign};
@@ -135,6 +135,15 @@ impl<'d> Design<'d> {
         &self.channels[record][self.quantities.binary_search(&quantity).unwrap_or(0)]
     }
 
+    pub(crate) fn quantities(&self) -> &[Quantity] {
+        &self.quantities
+    }
+
+    /// For each record, each of the quantities.
+    pub(crate) fn channels(&self) -> &[Vec<Vec<f64>>] {
+        &self.channels
+    }
+
     pub(crate) fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -210,5 +219,9 @@ impl Columns for Design<'_> {
     fn gram_columns(&self, which: &[usize]) -> Matrix {
         let (m, k) = (self.cols(), which.len());
         Matrix::from_column_major(m, k, self.fused_gram_columns(which)).unwrap_or_else(|| Matrix::zeros(m, k))
+    }
+
+    fn gram(&self, y: &[f64], columns: usize) -> Option<Gram> {
+        self.whole_gram(y, columns)
     }
 }

@@ -53,29 +53,95 @@ pub(crate) struct Distinct {
 }
 
 impl Distinct {
-    pub fn new(terms: &[Term]) -> Self {
-        let mut classes: Vec<Class> = Vec::new();
-        let mut known: HashMap<Vec<Factor>, u32> = HashMap::new();
-        let mut member = |a: &[Factor], b: &[Factor]| {
-            let mut factors = Term::new(a.iter().chain(b).copied()).factors().to_vec();
-            factors.sort_by_key(|f| (f.lag, f.quantity));
-            let shift = factors.first().map_or(0, |f| f.lag);
-            factors.iter_mut().for_each(|f| f.lag -= shift);
-            let class = *known.entry(factors).or_insert_with_key(|factors| {
-                classes.push(Class { factors: factors.clone(), base: shift, least: shift, most: shift });
-                (classes.len() - 1) as u32
-            });
-            let c = &mut classes[class as usize];
-            (c.least, c.most) = (c.least.min(shift), c.most.max(shift));
-            Member { class, shift: shift as u32 }
-        };
+    /// The classes of `terms`; `None` when the inner products of the terms with each other are of more than `limit` classes.
+    pub fn within(terms: &[Term], limit: usize) -> Option<Self> {
+        let mut products = Products::of(terms);
+        let codes: Vec<Vec<u64>> = terms.iter().map(|t| products.codes(t)).collect();
         let mut gram = Vec::with_capacity(terms.len() * (terms.len() + 1) / 2);
-        for (j, b) in terms.iter().enumerate() {
-            gram.extend(terms[..=j].iter().map(|a| member(a.factors(), b.factors())));
+        for (j, b) in codes.iter().enumerate() {
+            gram.extend(codes[..=j].iter().map(|a| products.member(a, b)));
+            if products.classes.len() > limit {
+                return None;
+            }
         }
-        let output = [Factor::value(Signal::Output, 0)];
-        let cross = terms.iter().map(|t| member(t.factors(), &output)).collect();
-        let target = member(&output, &output);
+        Some(products.finish(&codes, gram))
+    }
+}
+
+/// The products met so far. A factor is a code here: its lag times 2^32 and the number of its quantity, so that codes in order are factors
+/// by lag.
+struct Products {
+    quantities: Vec<Quantity>,
+    classes: Vec<Class>,
+    known: HashMap<Vec<u64>, u32>,
+    /// The product at hand.
+    product: Vec<u64>,
+}
+
+/// One sample of lag.
+const LAG: u64 = 1 << 32;
+
+impl Products {
+    fn of(terms: &[Term]) -> Self {
+        let output = Quantity::Value(Signal::Output);
+        let factors = terms.iter().flat_map(|t| t.factors().iter().map(|f| f.quantity));
+        let mut quantities: Vec<Quantity> = factors.chain([output]).collect();
+        quantities.sort();
+        quantities.dedup();
+        Self { quantities, classes: Vec::new(), known: HashMap::new(), product: Vec::new() }
+    }
+
+    fn codes(&self, term: &Term) -> Vec<u64> {
+        let number = |q: &Quantity| self.quantities.binary_search(q).unwrap_or(0) as u64;
+        let mut codes: Vec<u64> = term.factors().iter().map(|f| f.lag as u64 * LAG + number(&f.quantity)).collect();
+        codes.sort_unstable();
+        codes
+    }
+
+    /// The product of two products.
+    fn member<'a>(&mut self, mut a: &'a [u64], mut b: &'a [u64]) -> Member {
+        let Self { quantities, classes, known, product } = self;
+        product.clear();
+        loop {
+            let from = match (a, b) {
+                ([], []) => break,
+                ([x, ..], [y, ..]) if x > y => &mut b,
+                ([], _) => &mut b,
+                _ => &mut a,
+            };
+            let next = from[0];
+            *from = &from[1..];
+            // The square of a sign is 1.
+            if product.last() == Some(&next) && quantities[(next % LAG) as usize].is_sign() {
+                product.pop();
+            } else {
+                product.push(next);
+            }
+        }
+        let shift = product.first().map_or(0, |f| f / LAG);
+        product.iter_mut().for_each(|f| *f -= shift * LAG);
+        let shift = shift as usize;
+        let class = match known.get(product.as_slice()) {
+            Some(&class) => class,
+            None => {
+                let factor = |&f: &u64| Factor { quantity: quantities[(f % LAG) as usize], lag: (f / LAG) as usize };
+                let factors = product.iter().map(factor).collect();
+                classes.push(Class { factors, base: shift, least: shift, most: shift });
+                known.insert(product.clone(), (classes.len() - 1) as u32);
+                (classes.len() - 1) as u32
+            }
+        };
+        let c = &mut classes[class as usize];
+        (c.least, c.most) = (c.least.min(shift), c.most.max(shift));
+        Member { class, shift: shift as u32 }
+    }
+
+    /// With the products with the output.
+    fn finish(mut self, codes: &[Vec<u64>], gram: Vec<Member>) -> Distinct {
+        let output = self.codes(&Term::new([Factor::value(Signal::Output, 0)]));
+        let cross = codes.iter().map(|t| self.member(t, &output)).collect();
+        let target = self.member(&output, &output);
+        let mut classes = self.classes;
         // Summed up is the smallest shift that the matrix itself needs: then most sums begin at the same lag and share their heads.
         let mut least = vec![usize::MAX; classes.len()];
         for m in &gram {
@@ -84,7 +150,7 @@ impl Distinct {
         for (c, least) in classes.iter_mut().zip(least) {
             c.base = if least == usize::MAX { c.least } else { least };
         }
-        Self { classes, gram, cross, target }
+        Distinct { classes, gram, cross, target }
     }
 }
 

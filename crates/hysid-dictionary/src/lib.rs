@@ -48,6 +48,8 @@ mod run;
 mod signals;
 mod spec;
 mod term;
+mod totals;
+mod whole;
 
 pub use accumulate::GramSums;
 pub use design::Design;

@@ -155,7 +155,47 @@ proptest! {
         close("target", &[found.target], &[expected.target], n as f64)?;
         let which: Vec<usize> = which.into_iter().map(|j| j % design.cols()).collect();
         close("gram", design.gram_columns(&which).as_slice(), stored.gram_columns(&which).as_slice(), n as f64)?;
+        // On few samples the ends may be too large beside the sums.
+        let whole = design.gram(&target, usize::MAX);
+        prop_assert!(whole.is_some() || n < 100);
+        if let Some(whole) = whole {
+            let all: Vec<usize> = (0..design.cols()).collect();
+            close("whole", whole.matrix.as_slice(), stored.gram_columns(&all).as_slice(), n as f64)?;
+            close("whole cross", &whole.cross, &expected.cross, n as f64)?;
+            close("whole target", &[whole.target], &[expected.target], n as f64)?;
+            prop_assert_eq!(whole.rows, design.rows());
+        }
     }
+}
+
+/// One pass for all inner products: where sizes say so, for the design's own output, and where no digits are lost.
+#[test]
+fn one_pass_is_taken_where_it_is_cheaper_and_as_exact() {
+    let wave = |n: usize, p: f64| (0..n).map(|i| (i as f64 * p).sin()).collect::<Vec<f64>>();
+    let narx = |lags: usize| hysid_dictionary::Spec::narx(Signals::siso(), lags, 1..=lags, 3).build().unwrap();
+    // (lags, samples, columns wanted, whether one pass is cheaper)
+    let cases = [
+        (3, 60_000, 40, true),
+        (3, 60_000, 4, false),
+        (3, 2_000, 40, false),
+        (3, 2_000, usize::MAX, true),
+        (5, 200_000, 10, false),
+        (5, 200_000, 20, true),
+    ];
+    for (lags, samples, columns, expected) in cases {
+        let (u, y, dictionary) = (wave(samples, 0.37), wave(samples, 0.11), narx(lags));
+        let design = Design::new(&dictionary, &[Record::siso(&u, &y)]).unwrap();
+        let taken = design.gram(&design.target(), columns).is_some();
+        assert_eq!(taken, expected, "{} candidates, {samples} samples, {columns} columns", dictionary.len());
+    }
+    let (u, mut y, dictionary) = (wave(3_000, 0.37), wave(3_000, 0.11), narx(3));
+    let another = |design: &Design<'_>| design.target().iter().map(|y| y + 1.0).collect::<Vec<f64>>();
+    let design = Design::new(&dictionary, &[Record::siso(&u, &y)]).unwrap();
+    assert_eq!(design.gram(&another(&design), usize::MAX), None);
+    // A sample so large that nothing is left of the sums without it.
+    y[0] = 1e5;
+    let design = Design::new(&dictionary, &[Record::siso(&u, &y)]).unwrap();
+    assert_eq!(design.gram(&design.target(), usize::MAX), None);
 }
 
 #[test]
@@ -167,7 +207,8 @@ fn the_number_of_threads_changes_not_a_bit() {
     let target = design.target();
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| (design.start(&target), design.gram_columns(&[0, 5, 77])))
+        pool.install(|| (design.start(&target), design.gram_columns(&[0, 5, 77]), design.gram(&target, usize::MAX)))
     };
+    assert!(on(1).2.is_some());
     assert_eq!(on(1), on(3));
 }

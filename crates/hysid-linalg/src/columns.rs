@@ -63,6 +63,14 @@ pub trait Columns: Sync {
         Start { norms: sums[..m].to_vec(), cross: sums[m..2 * m].to_vec(), target: sums[2 * m] }
     }
 
+    /// All inner products with each other and with `y` (length `rows()`) in one pass, where a matrix has a way to them that is cheaper than
+    /// [`Columns::start`] and `columns` columns of the Gram matrix, and as exact; `None` otherwise. `usize::MAX` columns ask for the one pass
+    /// whatever it costs. Whether it is cheaper is judged by sizes, never by the clock.
+    fn gram(&self, y: &[f64], columns: usize) -> Option<Gram> {
+        let _ = (y, columns);
+        None
+    }
+
     /// The columns `which` of the Gram matrix Phi'Phi, as a `cols()` x `which.len()` matrix, in one pass.
     fn gram_columns(&self, which: &[usize]) -> Matrix {
         let (m, rows, k) = (self.cols(), self.rows(), which.len());

@@ -22,8 +22,17 @@ pub(crate) trait Evidence {
 
 /// A matrix and a target, sample by sample.
 pub(crate) struct Samples<'a, C: ?Sized> {
-    pub phi: &'a C,
-    pub y: &'a [f64],
+    phi: &'a C,
+    y: &'a [f64],
+    /// All inner products, where the search will want so many of them that one pass for all is cheaper.
+    gram: Option<Gram>,
+}
+
+impl<'a, C: Columns + ?Sized> Samples<'a, C> {
+    /// For a search that will ask for about so many columns of the Gram matrix.
+    pub fn new(phi: &'a C, y: &'a [f64], columns: usize) -> Self {
+        Self { phi, y, gram: phi.gram(y, columns) }
+    }
 }
 
 impl<C: Columns + ?Sized> Evidence for Samples<'_, C> {
@@ -36,11 +45,11 @@ impl<C: Columns + ?Sized> Evidence for Samples<'_, C> {
     }
 
     fn start(&self) -> Start {
-        self.phi.start(self.y)
+        self.gram.as_ref().map_or_else(|| self.phi.start(self.y), Evidence::start)
     }
 
     fn gram_columns(&self, which: &[usize]) -> Matrix {
-        self.phi.gram_columns(which)
+        self.gram.as_ref().map_or_else(|| self.phi.gram_columns(which), |gram| gram.gram_columns(which))
     }
 
     fn factor(&self, columns: &[usize]) -> Option<Vec<f64>> {

@@ -61,7 +61,7 @@ use hysid_linalg::{Columns, Gram};
 /// A target of another length than `phi` has rows, or all zero, or not finite; options out of range.
 pub fn select<C: Columns + ?Sized>(phi: &C, y: &[f64], options: &Options) -> Result<Selection, SelectError> {
     options.check(phi.rows(), phi.cols(), y)?;
-    find(&Samples { phi, y }, options)
+    find(&Samples::new(phi, y, options::columns_wanted(options, phi.rows(), phi.cols())), options)
 }
 
 /// The columns that explain the target, found from inner products alone: for data that do not fit into memory.

@@ -151,6 +151,25 @@ pub(crate) fn longest(options: &Options, rows: usize, cols: usize) -> usize {
     options.max_terms_allowed().max(options.forced.len()).min(cols).min(rows.saturating_sub(1).max(1))
 }
 
+/// Terms that a search takes which ends at the minimum of its criterion or at a tolerance, where more are allowed; a guess.
+const TAKEN: usize = 20;
+
+/// About how many columns of the Gram matrix a search asks for, by what it took on the systems that are measured: a third more than terms,
+/// for columns made on a guess, and as many again for exchanges.
+pub(crate) fn columns_wanted(options: &Options, rows: usize, cols: usize) -> usize {
+    let most = longest(options, rows, cols);
+    let terms = match options.criterion {
+        Criterion::Terms(_) => most,
+        _ => most.min(TAKEN.max(options.forced.len())),
+    };
+    let wanted = match options.search {
+        Search::Greedy | Search::MatchingPursuit => terms + terms / 3,
+        Search::Iterative { .. } => terms + terms / 2,
+        Search::Floating | Search::Beam { .. } => 2 * terms,
+    };
+    wanted.min(cols)
+}
+
 impl Options {
     /// The largest number of terms that may be chosen.
     pub(crate) fn max_terms_allowed(&self) -> usize {

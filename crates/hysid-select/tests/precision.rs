@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::{boucwen, narx};
+use common::{By, Way, boucwen, narx};
 use hysid_dictionary::{Design, Record, Signals, Spec};
 use hysid_linalg::{Columns, Matrix};
-use hysid_select::{Criterion, Options, Search, select};
+use hysid_select::{Criterion, Options, PressForm, Search, select};
 
 /// An unevaluated sum of two doubles, about 32 digits.
 #[derive(Clone, Copy)]
@@ -111,16 +111,57 @@ fn greedy_selection_equals_doubled_precision_or_says_where_it_may_not() {
             })
             .collect();
         let options = Options { search: Search::Greedy, criterion: Criterion::Terms(terms), ..Options::default() };
-        let ours = select(&design, &design.target(), &options).unwrap();
         let expected =
             reference(&Matrix::from_columns(&columns).unwrap(), &design.target(), terms, options.pivot_guard);
-        let same = ours.terms.iter().zip(&expected).take_while(|(a, b)| a == b).count();
-        let promised = ours.precision.doubtful_from.unwrap_or(ours.terms.len());
-        println!(
-            "{name}: same for {same} of {terms}, promised {promised}, smallest pivot {:.1e}, ERR deviation {:.1e}",
-            ours.precision.smallest_pivot, ours.precision.err_deviation
-        );
-        assert!(same >= promised, "{name}: promised {promised}, same only for {same}");
-        assert!(same >= sure, "{name}: same only for {same}");
+        for way in [Way::Apart, Way::Whole] {
+            let ours = select(&By(way, &design), &design.target(), &options).unwrap();
+            let same = ours.terms.iter().zip(&expected).take_while(|(a, b)| a == b).count();
+            let promised = ours.precision.doubtful_from.unwrap_or(ours.terms.len());
+            println!(
+                "{name}, {way:?}: same for {same} of {terms}, promised {promised}, smallest pivot {:.1e}, ERR deviation {:.1e}",
+                ours.precision.smallest_pivot, ours.precision.err_deviation
+            );
+            assert!(same >= promised, "{name}, {way:?}: promised {promised}, same only for {same}");
+            assert!(same >= sure, "{name}, {way:?}: same only for {same}");
+        }
+    }
+}
+
+/// One pass for all inner products is another order of additions, and nothing else: the same terms in the same order, and so the same bits
+/// of all that comes from the samples.
+#[test]
+fn one_pass_selects_what_columns_asked_for_one_by_one_select() {
+    let exact = Criterion::Press(PressForm::Exact);
+    let greedy = |n| Options { search: Search::Greedy, criterion: Criterion::Terms(n), ..Options::default() };
+    let cases = [
+        greedy(15),
+        Options::default(),
+        Options { criterion: exact, ..Options::default() },
+        Options { search: Search::Beam { width: 4 }, ..greedy(8) },
+        Options { search: Search::Iterative { starts: 3 }, ..greedy(8) },
+        Options { search: Search::MatchingPursuit, ..greedy(8) },
+    ];
+    let dictionary = Spec::narx(Signals::siso(), 3, 1..=3, 3).build().unwrap();
+    let (u, y) = narx(80_000, 3, 0.02);
+    let (mut holed, gap) = (y.clone(), 30_000);
+    holed[gap] = f64::NAN;
+    let long = Design::new(&dictionary, &[Record::siso(&u, &y)]).unwrap();
+    let cut = Design::new(&dictionary, &[Record::siso(&u, &holed), Record::siso(&u[..500], &y[..500])]).unwrap();
+    for (name, design) in [("long", long), ("cut", cut)] {
+        let target = design.target();
+        assert!(design.gram(&target, 40).is_some(), "{name}: one pass is not taken");
+        for options in &cases {
+            let (whole, apart) =
+                [Way::Whole, Way::Apart].map(|way| select(&By(way, &design), &target, options).unwrap()).into();
+            let what = format!("{name} {options:?}");
+            assert_eq!(whole.terms, apart.terms, "{what}");
+            assert_eq!(whole.stop, apart.stop, "{what}");
+            for (a, b) in whole.theta.iter().zip(&apart.theta) {
+                assert!((a - b).abs() <= 1e-9 * a.abs(), "{what}: {a} {b}");
+            }
+            for (a, b) in whole.steps.iter().zip(&apart.steps) {
+                assert!((a.press - b.press).abs() <= 1e-12 * a.press, "{what}: {} {}", a.press, b.press);
+            }
+        }
     }
 }

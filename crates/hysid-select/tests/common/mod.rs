@@ -1,7 +1,10 @@
 //! The known systems that selection is tried on: an 11-term polynomial NARX model and an oversampled Bouc-Wen oscillator.
 #![allow(dead_code)]
 
-use hysid_dictionary::{Signals, Term};
+use std::ops::Range;
+
+use hysid_dictionary::{Design, Signals, Term};
+use hysid_linalg::{Columns, Gram, Matrix, Start};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -68,4 +71,47 @@ pub fn boucwen(n: usize) -> (Vec<f64>, Vec<f64>) {
         h += dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
     }
     (u, y)
+}
+
+/// How a design gives its inner products, whatever would be cheaper.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Way {
+    /// Columns of the Gram matrix as they are asked for.
+    Apart,
+    /// All in one pass.
+    Whole,
+}
+
+/// A design that gives its inner products in one way.
+pub struct By<'a>(pub Way, pub &'a Design<'a>);
+
+impl Columns for By<'_> {
+    fn rows(&self) -> usize {
+        self.1.rows()
+    }
+
+    fn cols(&self) -> usize {
+        self.1.cols()
+    }
+
+    fn fill(&self, j: usize, rows: Range<usize>, out: &mut [f64]) {
+        self.1.fill(j, rows, out);
+    }
+
+    fn start(&self, y: &[f64]) -> Start {
+        assert_eq!(self.0, Way::Apart);
+        self.1.start(y)
+    }
+
+    fn gram_columns(&self, which: &[usize]) -> Matrix {
+        assert_eq!(self.0, Way::Apart);
+        self.1.gram_columns(which)
+    }
+
+    fn gram(&self, y: &[f64], _: usize) -> Option<Gram> {
+        match self.0 {
+            Way::Apart => None,
+            Way::Whole => self.1.gram(y, usize::MAX),
+        }
+    }
 }
