@@ -34,7 +34,8 @@ specimens!(
     "pendulum",
     "wing",
     "motor",
-    "filter"
+    "filter",
+    "controlled_damper"
 );
 
 /// A breach of the suite's laws.
@@ -197,6 +198,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.01, 12.0),
     (0.02, 6.0),
     (1e-5, 0.5),
+    (0.01, 4.0),
 ];
 
 /// A bench for each specimen.

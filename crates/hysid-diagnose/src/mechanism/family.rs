@@ -132,6 +132,11 @@ impl Family {
         }
     }
 
+    /// Whether an input that controls the damping controls the size of its members too: the yield force of a magnetorheological fluid.
+    pub fn follows_control(self) -> bool {
+        matches!(self, Self::DryFriction | Self::Presliding | Self::HystereticSpring)
+    }
+
     /// Whether its members are what noise of low frequency does: no noise model of a recording's own length can tell.
     pub fn is_slow_noise(self) -> bool {
         self == Self::SensorDrift

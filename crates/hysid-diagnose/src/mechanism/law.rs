@@ -302,6 +302,16 @@ impl Law {
         self
     }
 
+    /// A force whose size follows the slot's `control`, the input that the simulation's own damping follows there.
+    #[must_use]
+    pub fn controlled(mut self) -> Self {
+        if let Change::Force(text) = &mut self.change {
+            *text = format!("({text})*(1 + b_c*control)");
+            return self.shape("b_c", "1/control", Grid::Values(vec![0.0, 0.5, 4.0])).within(-0.5, 50.0);
+        }
+        self
+    }
+
     /// Reports a number made of the parameters; a parameter of the same name is then left out of the report.
     #[must_use]
     pub fn report(mut self, name: impl Into<String>, measure: impl Into<String>, value: impl Into<String>) -> Self {

@@ -120,6 +120,13 @@ impl Mechanism {
         catalogue().iter().copied().filter(|m| m.family == self.family && m.id != self.id)
     }
 
+    /// The law at a slot. Friction and hysteresis follow what the damping of the simulation follows: where an input controls it, their size
+    /// too.
+    pub(crate) fn law_at(&self, slot: &Slot, purpose: Purpose) -> Law {
+        let law = (self.law)(slot, purpose);
+        if slot.has("control") && self.family.follows_control() { law.controlled() } else { law }
+    }
+
     /// What the recording lacks for this mechanism to be seen at the slot, in words; `None` when nothing is lacking.
     pub fn lacking(&self, signals: &Signals) -> Option<String> {
         let missing: Vec<String> = self.needs.iter().filter_map(|need| need.lacking(signals)).collect();

@@ -61,7 +61,9 @@ pub fn catalogue_page() -> String {
          Printed from the code (`crates/hysid-diagnose/src/mechanism`); a test holds the two equal. Symbols of a law: `x`, `v` displacement and\n\
          velocity at the slot, `u` input, `y` output, `s` what a store holds, `p` the parameter, `F` the size of the forces, `k`, `m` the\n\
          simulation's own stiffness and mass there, `t` time, `T` duration, `h` sampling period. In brackets stands what a parameter is measured\n\
-         in: its unit, and its natural size on a recording. `w` is the weight of a form that exists for screening only.\n",
+         in: its unit, and its natural size on a recording. `w` is the weight of a form that exists for screening only. Where an input `control`\n\
+         controls the simulation's own damping (the voltage of a magnetorheological damper), the forces of `dry_friction`, `presliding` and\n\
+         `hysteretic_spring` are multiplied by `1 + b_c*control`.\n",
     );
     let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
     for family in Family::ALL {
@@ -83,8 +85,8 @@ fn entry(page: &mut String, mechanism: &Mechanism, structures: &[Structure]) {
     for place in mechanism.places {
         let mut slots = structures.iter().flat_map(|s| mechanism.slots(s));
         let Some(slot) = slots.find(|s| s.place == *place) else { continue };
-        let refit = (mechanism.law)(&slot, Purpose::Refit);
-        let screening = (mechanism.law)(&slot, Purpose::Screening);
+        let refit = mechanism.law_at(&slot, Purpose::Refit);
+        let screening = mechanism.law_at(&slot, Purpose::Screening);
         let mut text = law_text(&refit);
         if screening.change != refit.change {
             let _ = write!(text, "; screened as {}", law_text(&screening));

@@ -173,7 +173,7 @@ impl Mechanism {
         signals: &Signals,
         purpose: Purpose,
     ) -> Result<Rewritten, RewriteError> {
-        let law = (self.law)(slot, purpose);
+        let law = self.law_at(slot, purpose);
         write_law(simulation, slot, signals, &law, purpose).map_err(|reason| RewriteError {
             mechanism: self.id,
             slot: slot.label.clone(),

@@ -2,7 +2,7 @@
 
 use hysid_plant::Expr;
 
-use super::algebra::{has_free_constant, linear_coefficient, only_parameters, size};
+use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, size};
 use super::find::Finder;
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
 use super::{Place, Slot, Target};
@@ -51,6 +51,9 @@ impl Finder<'_> {
         let mut slot = Slot::new(place, label, format!("at {}", motion.name()), target);
         let v = Expr::symbol(motion.v);
         slot.loops = self.loops(&v);
+        if let Some(control) = self.control(motion.derivative, &v) {
+            slot.offer(self.simulation, "control", control);
+        }
         slot.offer(self.simulation, "v", v);
         if let Some(x) = motion.x {
             slot.offer(self.simulation, "x", Expr::symbol(x));
@@ -116,6 +119,17 @@ impl Finder<'_> {
         slots
     }
 
+    /// The input by which a damping force is controlled, as the voltage of a magnetorheological damper: the coefficient of the velocity
+    /// holds it, and it is itself no motion.
+    fn control(&self, force: &Expr, v: &Expr) -> Option<Expr> {
+        let Expr::Symbol(v) = v else { return None };
+        let damping: Vec<Expr> = force.terms().into_iter().filter_map(|(_, term)| coefficient(term, v)).collect();
+        let controls =
+            |input: &str| self.kinematic_input(input) == Kinematic::Neither && damping.iter().any(|c| c.uses(input));
+        let input = self.simulation.inputs.iter().find(|i| controls(&i.symbol))?;
+        Some(Expr::symbol(&input.symbol))
+    }
+
     pub(super) fn force_laws(&self) -> Vec<Slot> {
         if !self.is_force_law() {
             return Vec::new();
@@ -141,6 +155,9 @@ impl Finder<'_> {
                     Target::Output(output.column.clone()),
                 );
                 slot.loops = self.loops(&v);
+                if let Some(control) = self.control(&output.expression, &v) {
+                    slot.offer(self.simulation, "control", control);
+                }
                 if let Some(v) = velocities.get(i)
                     && let Some(c) = linear_coefficient(self.simulation, &output.expression, v)
                 {

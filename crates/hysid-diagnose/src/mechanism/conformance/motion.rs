@@ -28,7 +28,7 @@ pub fn example_recording(simulation: &Simulation, period_s: f64, size: f64) -> O
     let mut inputs: Vec<Vec<f64>> =
         (0..simulation.inputs.len()).map(|c| (0..SAMPLES).map(|n| wave(n, c)).collect()).collect();
     // A velocity beside its displacement is its derivative.
-    if let [x, v] = inputs.as_mut_slice() {
+    if let [x, v, ..] = inputs.as_mut_slice() {
         let last = SAMPLES - 1;
         *v = (0..SAMPLES).map(|n| (x[(n + 1).min(last)] - x[n.saturating_sub(1)]) / (2.0 * period_s)).collect();
     }

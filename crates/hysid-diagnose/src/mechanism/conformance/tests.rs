@@ -87,6 +87,8 @@ fn a_mechanism_is_recovered_from_its_own_simulation() {
     check("Motor", "delay");
     check("Tank", "abrupt_change");
     check("Circuit", "input_saturation");
+    check("Controlled", "coulomb_friction");
+    check("Controlled", "dahl_friction");
     // Between the two filters.
     check_at("Circuit", "input_saturation", 1);
 }
@@ -126,4 +128,14 @@ fn what_a_part_passes_on_is_one_signal_however_many_states_it_is_made_of() {
     check("w*(p + T*r - q)", &["p + T*r"]);
     check("w*(p - T*r - q)", &["p - T*r"]);
     check("w*(p - q) + w*T*abs(r)", &["p", "r"]);
+}
+
+/// Only where the simulation's own damping follows an input do friction and hysteresis follow it.
+#[test]
+fn only_a_controlled_damping_has_a_control() {
+    for simulation in specimens() {
+        let controlled = simulation.title.starts_with("Controlled");
+        let has = Structure::of(&simulation).slots.iter().any(|s| s.has("control"));
+        assert_eq!(has, controlled, "{}", simulation.title);
+    }
 }
