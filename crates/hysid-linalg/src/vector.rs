@@ -53,6 +53,26 @@ both_forms! {
 }
 
 both_forms! {
+    /// out = a b for small matrices by rows, every row filled up to `lanes` times eight entries; `b` has as many rows as `a` has columns.
+    ///
+    /// An entry is the sum over the rows of `b`, in their order, of products that are rounded: the bits are those of the plain loops. What
+    /// fills up the rows of `b` fills up those of `out`.
+    pub fn product_of_rows(a: &[f64], b: &[[f64; 8]], lanes: usize, out: &mut [[f64; 8]]) {
+        for (a, out) in a.chunks_exact(8 * lanes).zip(out.chunks_exact_mut(lanes)) {
+            for (l, out) in out.iter_mut().enumerate() {
+                let mut sum = [0.0; 8];
+                for (a, b) in a.iter().zip(b.chunks_exact(lanes)) {
+                    for k in 0..8 {
+                        sum[k] += a * b[l][k];
+                    }
+                }
+                *out = sum;
+            }
+        }
+    }
+}
+
+both_forms! {
     /// y -= a x.
     pub fn subtract_multiple(a: f64, x: &[f64], y: &mut [f64]) {
         for (y, x) in y.iter_mut().zip(x) {
@@ -105,6 +125,27 @@ mod tests {
             assert_eq!(dot(&a, &b), expected, "{n}");
             let squares: f64 = a.iter().map(|x| x * x / 4.0).sum();
             approx::assert_relative_eq!(leave_one_out_sum(&a, &b, 1e-9), squares, max_relative = 1e-14);
+        }
+    }
+
+    #[test]
+    fn products_of_small_matrices_are_those_of_the_plain_loops_to_the_bit() {
+        let value = |i: usize| ((i * 7919 + 3) % 1013) as f64 / 500.0 - 1.0;
+        for n in [1_usize, 3, 7, 8, 9, 17] {
+            let lanes = n.div_ceil(8);
+            let matrix = |from: usize| -> Vec<[f64; 8]> {
+                let entry = |i: usize| if i % (8 * lanes) < n { value(from + i) } else { 0.0 };
+                (0..n * lanes).map(|l| std::array::from_fn(|k| entry(8 * l + k))).collect()
+            };
+            let (a, b, mut out) = (matrix(0), matrix(500), matrix(900));
+            product_of_rows(a.as_flattened(), &b, lanes, &mut out);
+            let at = |m: &[[f64; 8]], i: usize, j: usize| m[i * lanes + j / 8][j % 8];
+            for i in 0..n {
+                for j in 0..8 * lanes {
+                    let expected: f64 = (0..n).map(|k| at(&a, i, k) * at(&b, k, j)).sum();
+                    assert_eq!(at(&out, i, j), if j < n { expected } else { 0.0 }, "{n}: {i} {j}");
+                }
+            }
         }
     }
 }

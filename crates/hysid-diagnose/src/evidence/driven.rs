@@ -107,9 +107,9 @@ impl Driven {
         let total: usize = stretches.iter().map(|s| s.len()).sum();
         let (mut squares, mut power, mut log) = (0.0, 0.0, 0.0);
         for s in stretches {
-            filter.run(s.len(), |step, predicted, k| {
+            filter.run(s.len(), |sigma, predicted, k| {
                 let innovation = s[k] - predicted;
-                squares += (innovation / step.sigma).powi(2);
+                squares += (innovation / sigma).powi(2);
                 innovation
             });
             power += norm2(s);
@@ -137,7 +137,7 @@ impl Driven {
 
     /// Standard deviation of the innovations, far from the start.
     pub fn innovation(&self) -> f64 {
-        self.sigma * self.filter.step(usize::MAX).sigma
+        self.sigma * self.filter.sigma(usize::MAX)
     }
 
     /// Standard deviation of what it was fitted to.
@@ -147,16 +147,16 @@ impl Driven {
 
     /// Whitens one contiguous stretch into `out` (same length).
     pub fn whiten(&self, e: &[f64], out: &mut [f64]) {
-        self.filter.run(e.len(), |step, predicted, k| {
-            out[k] = (e[k] - predicted) / (step.sigma * self.sigma);
+        self.filter.run(e.len(), |sigma, predicted, k| {
+            out[k] = (e[k] - predicted) / (sigma * self.sigma);
             e[k] - predicted
         });
     }
 
     /// Colours unit white noise in place.
     pub fn colour(&self, w: &mut [f64]) {
-        self.filter.run(w.len(), |step, predicted, k| {
-            let innovation = w[k] * step.sigma * self.sigma;
+        self.filter.run(w.len(), |sigma, predicted, k| {
+            let innovation = w[k] * sigma * self.sigma;
             w[k] = predicted + innovation;
             innovation
         });
@@ -185,7 +185,7 @@ mod tests {
         assert!((m.sigma - 1.0).abs() < 0.03, "{}", m.sigma);
         // The variance of the force, from the filter's settled innovation: it grows with the share alone.
         let same = Filter::new(&path, 0.0, size * size, 6000).unwrap();
-        assert!((m.innovation() / same.step(usize::MAX).sigma - 1.0).abs() < 0.04);
+        assert!((m.innovation() / same.sigma(usize::MAX) - 1.0).abs() < 0.04);
     }
 
     #[test]

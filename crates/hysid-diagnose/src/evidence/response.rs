@@ -10,7 +10,12 @@
 //!
 //! Reference: P. J. Brockwell and R. A. Davis, Time Series, section 12.2; P. Whittle (1953) for the spectrum.
 
+use hysid_linalg::product_of_rows;
 use nalgebra::{DMatrix, DVector};
+
+/// Entries of a vector or of a row of a matrix that are worked on together.
+const LANE: usize = 8;
+type Lane = [f64; LANE];
 
 /// Change of a gain below which the filter has settled.
 const SETTLED: f64 = 1e-8;
@@ -94,23 +99,26 @@ fn dot_short(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// One row's part in the filter.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Step {
-    /// Standard deviation of the innovation.
-    pub(super) sigma: f64,
-    /// What an innovation adds to the predicted state.
-    gain: Vec<f64>,
+/// The rows of a matrix, each filled up with zeros to whole lanes.
+fn padded(matrix: &DMatrix<f64>) -> Vec<Lane> {
+    let lanes = matrix.ncols().div_ceil(LANE);
+    let mut rows = vec![[0.0; LANE]; matrix.nrows() * lanes];
+    for (i, row) in matrix.row_iter().enumerate() {
+        row.iter().enumerate().for_each(|(j, x)| rows[i * lanes + j / LANE][j % LANE] = *x);
+    }
+    rows
 }
 
 /// The filter of a path and a share of the force, for noise of the sensor with unit variance.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Filter {
-    /// By rows.
-    a: Vec<f64>,
+    /// The matrix's columns, in lanes.
+    columns: Vec<Lane>,
     c: Vec<f64>,
-    /// Until it has settled; the last one goes on.
-    steps: Vec<Step>,
+    /// Standard deviation of each row's innovation, until the filter has settled; the last one goes on.
+    sigmas: Vec<f64>,
+    /// What each row's innovation adds to the predicted state, in lanes.
+    gains: Vec<Lane>,
 }
 
 impl Filter {
@@ -118,65 +126,67 @@ impl Filter {
     pub(super) fn new(path: &ForcePath, pole: f64, variance: f64, rows: usize) -> Option<Self> {
         let (a, c, added, start) = path.noise(pole);
         let n = c.len();
-        // Symmetric matrices are the same by rows and by columns; nothing is allocated within the recursion but the gains.
-        let a = a.transpose().as_slice().to_vec();
-        let added = (added * variance).as_slice().to_vec();
-        let mut p = (start * variance).as_slice().to_vec();
-        let (mut pc, mut half) = (vec![0.0; n], vec![0.0; n * n]);
-        let times = |m: &[f64], x: &[f64], i: usize| dot_short(&m[i * n..(i + 1) * n], x);
-        let mut steps: Vec<Step> = Vec::new();
-        for _ in 0..rows.max(1) {
-            for (i, pc) in pc.iter_mut().enumerate() {
-                *pc = times(&p, c.as_slice(), i);
-            }
-            let power = 1.0 + dot_short(c.as_slice(), &pc).max(0.0);
-            let gain: Vec<f64> = (0..n).map(|i| times(&a, &pc, i) / power).collect();
-            for (i, row) in p.chunks_exact_mut(n).enumerate() {
-                row.iter_mut().zip(&pc).for_each(|(p, other)| *p -= pc[i] * other / power);
+        let lanes = n.div_ceil(LANE);
+        // Nothing is allocated within the recursion but the gains.
+        let (by_rows, columns, added) = (padded(&a), padded(&a.transpose()), padded(&(added * variance)));
+        let mut p = padded(&(start * variance));
+        let (mut pc, mut half) = (vec![[0.0; LANE]; lanes], vec![[0.0; LANE]; n * lanes]);
+        let (mut sigmas, mut gains): (Vec<f64>, Vec<Lane>) = (Vec::new(), Vec::new());
+        let whole = padded(&DMatrix::from_row_slice(1, n, c.as_slice()));
+        for k in 0..rows.max(1) {
+            product_of_rows(whole.as_flattened(), &p, lanes, &mut pc);
+            let seen = pc.as_flattened();
+            let power = 1.0 + dot_short(c.as_slice(), seen).max(0.0);
+            gains.resize((k + 1) * lanes, [0.0; LANE]);
+            let (before, gain) = gains.split_at_mut(k * lanes);
+            product_of_rows(seen, &columns, lanes, gain);
+            gain.as_flattened_mut().iter_mut().for_each(|g| *g /= power);
+            for (row, own) in p.chunks_exact_mut(lanes).zip(seen) {
+                row.as_flattened_mut().iter_mut().zip(seen).for_each(|(p, other)| *p -= own * other / power);
             }
             // a (p a'), its upper half mirrored.
-            for (i, row) in half.chunks_exact_mut(n).enumerate() {
-                row.iter_mut().enumerate().for_each(|(j, h)| *h = times(&p, &a[j * n..(j + 1) * n], i));
-            }
+            product_of_rows(p.as_flattened(), &columns, lanes, &mut half);
+            product_of_rows(by_rows.as_flattened(), &half, lanes, &mut p);
+            p.as_flattened_mut().iter_mut().zip(added.as_flattened()).for_each(|(p, added)| *p += added);
+            let (all, width) = (p.as_flattened_mut(), lanes * LANE);
             for i in 0..n {
-                for j in i..n {
-                    let v: f64 = (0..n).map(|k| a[i * n + k] * half[k * n + j]).sum();
-                    p[i * n + j] = v + added[i * n + j];
-                    p[j * n + i] = p[i * n + j];
+                for j in i + 1..n {
+                    all[j * width + i] = all[i * width + j];
                 }
             }
-            let step = Step { sigma: power.sqrt(), gain };
-            if !step.sigma.is_finite() || step.gain.iter().any(|g| !g.is_finite()) {
+            let (sigma, gain) = (power.sqrt(), &gain.as_flattened()[..n]);
+            if !sigma.is_finite() || gain.iter().any(|g| !g.is_finite()) {
                 return None;
             }
-            let settled = steps.last().is_some_and(|last| {
+            let settled = sigmas.last().is_some_and(|last| {
                 let near = |x: f64, y: f64| (x - y).abs() <= SETTLED * (1e-6 + x.abs());
-                near(step.sigma, last.sigma) && step.gain.iter().zip(&last.gain).all(|(x, y)| near(*x, *y))
+                let before = before[(k - 1) * lanes..].as_flattened();
+                near(sigma, *last) && gain.iter().zip(before).all(|(x, y)| near(*x, *y))
             });
-            steps.push(step);
+            sigmas.push(sigma);
             // The first rows of a chain of integrators see nothing of the force.
-            if settled && steps.len() > 2 * n + 2 {
+            if settled && sigmas.len() > 2 * n + 2 {
                 break;
             }
         }
-        Some(Self { a, c: c.as_slice().to_vec(), steps })
+        Some(Self { columns, c: c.as_slice().to_vec(), sigmas, gains })
     }
 
-    pub(super) fn step(&self, k: usize) -> &Step {
-        &self.steps[k.min(self.steps.len() - 1)]
+    /// Standard deviation of the innovation of row `k`.
+    pub(super) fn sigma(&self, k: usize) -> f64 {
+        self.sigmas[k.min(self.sigmas.len() - 1)]
     }
 
-    /// Runs through a stretch: `f(step, prediction, sample)` gives the innovation.
-    pub(super) fn run(&self, len: usize, mut f: impl FnMut(&Step, f64, usize) -> f64) {
-        let n = self.c.len();
-        let (mut x, mut next) = (vec![0.0; n], vec![0.0; n]);
+    /// Runs through a stretch: `f(sigma, prediction, sample)` gives the innovation.
+    pub(super) fn run(&self, len: usize, mut f: impl FnMut(f64, f64, usize) -> f64) {
+        let lanes = self.c.len().div_ceil(LANE);
+        let (mut x, mut next) = (vec![[0.0; LANE]; lanes], vec![[0.0; LANE]; lanes]);
         for k in 0..len {
-            let step = self.step(k);
-            let predicted: f64 = self.c.iter().zip(&x).map(|(c, x)| c * x).sum();
-            let innovation = f(step, predicted, k);
-            for ((next, row), gain) in next.iter_mut().zip(self.a.chunks_exact(n)).zip(&step.gain) {
-                *next = row.iter().zip(&x).map(|(a, x)| a * x).sum::<f64>() + gain * innovation;
-            }
+            let row = k.min(self.sigmas.len() - 1);
+            let innovation = f(self.sigmas[row], dot_short(&self.c, x.as_flattened()), k);
+            product_of_rows(x.as_flattened(), &self.columns, lanes, &mut next);
+            let gain = self.gains[row * lanes..(row + 1) * lanes].as_flattened();
+            next.as_flattened_mut().iter_mut().zip(gain).for_each(|(next, gain)| *next += gain * innovation);
             std::mem::swap(&mut x, &mut next);
         }
     }
@@ -187,8 +197,8 @@ impl Filter {
     }
 
     pub(super) fn log_scale(&self, n: usize) -> f64 {
-        let first: f64 = self.steps.iter().take(n).map(|s| s.sigma.ln()).sum();
-        first + n.saturating_sub(self.steps.len()) as f64 * self.step(usize::MAX).sigma.ln()
+        let first: f64 = self.sigmas.iter().take(n).map(|s| s.ln()).sum();
+        first + n.saturating_sub(self.sigmas.len()) as f64 * self.sigma(usize::MAX).ln()
     }
 }
 
@@ -311,8 +321,8 @@ mod tests {
             let expected = factor.l().solve_lower_triangular(&DVector::from_column_slice(&e)).unwrap();
             let filter = Filter::new(&path, pole, share, n).unwrap();
             let mut w = vec![0.0; n];
-            filter.run(n, |step, predicted, k| {
-                w[k] = (e[k] - predicted) / step.sigma;
+            filter.run(n, |sigma, predicted, k| {
+                w[k] = (e[k] - predicted) / sigma;
                 e[k] - predicted
             });
             assert!(w.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{pole}");
