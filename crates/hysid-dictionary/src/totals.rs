@@ -14,8 +14,10 @@ use crate::distinct::{Class, Distinct, Kernel, Member, Work};
 
 /// Rows whose sums are made from zero, at most.
 pub(crate) const RUN: usize = 8192;
-/// Runs whose sums are held at the same time.
-const TOGETHER: usize = 64;
+/// Sums of runs that are held at the same time, about: 8 MB.
+const HELD: usize = 1_000_000;
+/// Shares of the runs for each thread, so that one that was held up does not keep the others waiting.
+const SHARES: usize = 8;
 /// Work (in multiply-adds) below which threads cost more than they bring.
 const SERIAL_BELOW: usize = 3_000_000;
 
@@ -103,14 +105,19 @@ impl Totals {
         let kernel = &self.kernel;
         let runs = runs(ranges);
         let rows: usize = ranges.iter().map(ExactSizeIterator::len).sum();
-        for runs in runs.chunks(TOGETHER) {
-            let parts: Vec<Vec<f64>> = if rows * kernel.work() < SERIAL_BELOW || runs.len() < 2 {
+        let threads = if rows * kernel.work() < SERIAL_BELOW { 1 } else { rayon::current_num_threads() };
+        for runs in runs.chunks((HELD / self.sums.len().max(1)).max(SHARES * threads)) {
+            // Buffers are made once for each share, not for each run.
+            let share = |runs: &[Vec<Range<usize>>]| -> Vec<Vec<f64>> {
                 let mut work = Work::new(kernel);
                 runs.iter().map(|run| kernel.sums(&mut work, channels, run)).collect()
-            } else {
-                runs.par_iter().map_init(|| Work::new(kernel), |work, run| kernel.sums(work, channels, run)).collect()
             };
-            for part in &parts {
+            let parts: Vec<Vec<Vec<f64>>> = if threads == 1 {
+                vec![share(runs)]
+            } else {
+                runs.par_chunks(runs.len().div_ceil(SHARES * threads)).map(share).collect()
+            };
+            for part in parts.iter().flatten() {
                 for (sum, p) in self.sums.iter_mut().zip(part) {
                     sum.add(*p);
                 }
