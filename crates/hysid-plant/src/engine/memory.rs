@@ -77,6 +77,8 @@ struct Decay<N> {
     ratio: N,
     /// What is left of a difference after the length.
     decay: N,
+    /// What the first and the middle stages of a Runge-Kutta step of this length see of the difference.
+    seen: (N, N),
 }
 
 impl<N: Number> Decay<N> {
@@ -84,18 +86,18 @@ impl<N: Number> Decay<N> {
         let length = since.seconds();
         // Below a thousandth of the time gone the exponential is zero; the time constant then acts by the slope alone.
         let decay = length.div(tau.max(length.scale(1e-3))).neg().call(Function::Exp);
-        Self { since: since.value(), ratio: tau.div(length), decay }
+        let ratio = tau.div(length);
+        Self { since: since.value(), ratio, decay, seen: Self::seen(ratio, decay) }
     }
 
-    /// What the first and the middle stages of a Runge-Kutta step of this length see of the difference, so that the step integrates it
-    /// exactly, once and twice. A lag shorter than the step has a transient that passes between the stages; with its values there the
-    /// response would not move with the time constant.
-    fn seen(&self) -> (N, N) {
+    /// What the stages see, so that the step integrates the difference exactly, once and twice. A lag shorter than the step has a transient
+    /// that passes between the stages; with its values there the response would not move with the time constant.
+    fn seen(ratio: N, decay: N) -> (N, N) {
         // Beyond, the differences below would be rounding.
-        let ratio = self.ratio.min(N::lift(1e5));
-        let once = ratio.mul(N::lift(1.0).sub(self.decay));
+        let ratio = ratio.min(N::lift(1e5));
+        let once = ratio.mul(N::lift(1.0).sub(decay));
         let twice = ratio.mul(N::lift(1.0).sub(once));
-        let middle = once.scale(3.0).sub(twice.scale(3.0)).sub(self.decay.scale(0.5));
+        let middle = once.scale(3.0).sub(twice.scale(3.0)).sub(decay.scale(0.5));
         (twice.scale(6.0).sub(middle.scale(2.0)), middle)
     }
 }
@@ -191,6 +193,7 @@ impl<N: Number> Cell<N> {
         value
     }
 
+    #[inline(always)]
     pub fn lag<S: Span<N>>(&mut self, w: N, tau: N, moment: &Moment<S>) -> N {
         if !self.filled {
             self.filled = true;
@@ -207,10 +210,10 @@ impl<N: Number> Cell<N> {
             let gone = self.decay(moment.since, tau);
             let slope_tau = w.sub(self.argument).mul(gone.ratio);
             let start = self.held.sub(self.argument).add(slope_tau);
-            let left = if moment.midway() { self.decay(moment.step, tau).seen().1 } else { gone.decay };
+            let left = if moment.midway() { self.decay(moment.step, tau).seen.1 } else { gone.decay };
             w.sub(slope_tau).add(start.mul(left))
         } else if step > 0.0 {
-            w.add(self.held.sub(w).mul(self.decay(moment.step, tau).seen().0))
+            w.add(self.held.sub(w).mul(self.decay(moment.step, tau).seen.0))
         } else {
             self.held.where_positive(tau, w)
         };
@@ -227,8 +230,13 @@ impl<N: Number> Cell<N> {
         let wanted = since.value();
         match self.decays {
             [Some(known), _] | [_, Some(known)] if known.since == wanted => return known,
-            _ => {}
+            _ => self.met(since, tau),
         }
+    }
+
+    /// A length that was not met before.
+    #[inline(never)]
+    fn met<S: Span<N>>(&mut self, since: S, tau: N) -> Decay<N> {
         let new = Decay::new(since, tau);
         self.decays = [Some(new), self.decays[0]];
         new
