@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use crate::base::Base;
 use crate::budget::Step;
 use crate::calibrate::calibrated_copy;
+use crate::finer::finer;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Mechanism, Purpose};
 use crate::model::Values;
 use crate::screen::{Candidate, rewrite_at, with_added_starts};
 
@@ -147,11 +148,11 @@ fn refit_from<'d>(
     }
     let mut h = hypothesis(setting, parent, candidate, best?);
     finish(setting, &mut h, parent.effects.len());
-    Some(h)
+    Some(finer(setting, parent, &h).unwrap_or(h))
 }
 
 /// The end of a fit: shapes that least squares cannot move, of the effects from `from` on, then a round under the hypothesis' own noise.
-fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
+pub fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
     for index in from..h.effects.len() {
         profile_shapes(setting, h, index);
     }
@@ -293,6 +294,8 @@ pub struct Part {
     pub mechanism: &'static Mechanism,
     /// The slot.
     pub slot: String,
+    /// The form of its law.
+    pub purpose: Purpose,
     /// Start values of amplitudes, then shapes; missing ones stay as the law has them.
     pub values: Vec<Option<f64>>,
     /// Share that the simulation's own parameters absorb, from the screening.
@@ -309,6 +312,7 @@ impl Part {
         Self {
             mechanism: candidate.mechanism,
             slot: candidate.slot.label.clone(),
+            purpose: candidate.refit.purpose,
             values: values
                 .iter()
                 .map(|n| find(amplitudes, n).or_else(|| find(shapes, n)).or_else(|| find(&start, n)))
@@ -322,6 +326,7 @@ impl Part {
         Self {
             mechanism: effect.mechanism,
             slot: effect.slot.label.clone(),
+            purpose: effect.written.purpose,
             values: effect.written.parameters_of().iter().map(|n| values.parameters.get(n).copied()).collect(),
             concealment: effect.concealment,
         }
@@ -340,7 +345,8 @@ pub fn assemble<'d>(
     let mut values = own.clone();
     let mut effects = Vec::new();
     for part in parts {
-        let (written, slot) = rewrite_at(&none.base, &document, &setting.original, part.mechanism, &part.slot)?;
+        let (written, slot) =
+            rewrite_at(&none.base, &document, &setting.original, part.mechanism, &part.slot, part.purpose)?;
         values = with_added_starts(&values, &written, &slot, setting.data.stretches.len());
         for (name, x) in written.parameters_of().iter().zip(&part.values) {
             if let (Some(x), Some(p)) = (x, written.simulation.parameter(name)) {

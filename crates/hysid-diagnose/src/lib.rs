@@ -21,6 +21,7 @@ mod data;
 mod draw;
 mod error;
 mod experiment;
+mod finer;
 mod firmness;
 mod fitting;
 mod force;

@@ -2,8 +2,8 @@
 
 use crate::budget::Step;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
-use crate::mechanism::Rewritten;
 use crate::mechanism::numerics::{SOLVER_ARTEFACT, variants};
+use crate::mechanism::{Purpose, Rewritten};
 use crate::slot::{Slot, Structure};
 
 /// Log likelihood that a variant must gain to be listed at all.
@@ -40,6 +40,7 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
                 report: Vec::new(),
                 states: Vec::new(),
                 sum_of_others: false,
+                purpose: Purpose::Refit,
             };
             let effect = Effect { mechanism: &SOLVER_ARTEFACT, slot, written, concealment: None };
             best = Some(Hypothesis { effects: vec![effect], base, log_evidence: evidence });

@@ -308,12 +308,13 @@ pub fn rewrite_at(
     original: &Simulation,
     mechanism: &'static Mechanism,
     label: &str,
+    purpose: Purpose,
 ) -> Option<(Rewritten, Slot)> {
     let sizes = Structure::within(&base.document(), original);
     let at = signals(base, &sizes, &residual_peaks(base));
     let place = sizes.slots.iter().position(|s| s.label == label && mechanism.places.contains(&s.place))?;
     let structure = Structure::within(document, original);
     let slot = structure.slots.iter().find(|s| s.label == label && mechanism.places.contains(&s.place))?.clone();
-    let written = mechanism.rewrite(document, &slot, at[place].as_ref()?, Purpose::Refit).ok()?;
+    let written = mechanism.rewrite(document, &slot, at[place].as_ref()?, purpose).ok()?;
     Some((written, slot))
 }

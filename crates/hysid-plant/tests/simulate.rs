@@ -135,10 +135,11 @@ fn static_operators_follow_their_definitions() {
             ("delay", "delay(u, s)"),
             ("relay", "relay(u, -0.4, 0.6)"),
             ("rate", "d(u)"),
+            ("widening", "play(u, r*(1 + s*abs(d(u))))"),
         ],
     );
     let y = simulate(&compiled, &drive(400, amplitude), 1);
-    let (mut play, mut relay) = (0.0_f64, -1.0);
+    let (mut play, mut widening, mut relay) = (0.0_f64, 0.0_f64, -1.0);
     for n in 0..400 {
         let u = amplitude(0.01 * n as f64);
         play = play.clamp(u - 0.3, u + 0.3);
@@ -150,6 +151,9 @@ fn static_operators_follow_their_definitions() {
             relay
         };
         assert!((y.outputs[0][n] - play).abs() < 1e-15);
+        let half = 0.3 * (1.0 + 0.05 * y.outputs[4][n].abs());
+        widening = widening.clamp(u - half, u + half);
+        assert!((y.outputs[5][n] - widening).abs() < 1e-14);
         assert_eq!(y.outputs[3][n], relay);
         let late = if n < 5 { 0.0 } else { amplitude(0.01 * (n - 5) as f64) };
         assert!((y.outputs[2][n] - late).abs() < 1e-9, "{n}: {} {late}", y.outputs[2][n]);

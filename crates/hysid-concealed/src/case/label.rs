@@ -119,6 +119,10 @@ pub(super) fn concealed(design: &Design, e: &Effect) -> Concealed {
         Law::InputOffset if rubs => vec![("asymmetric_friction", "dry_friction")],
         // Dahl's law is Bouc and Wen's with gamma = 0 and n = 1.
         Law::Dahl => vec![("bouc_wen", "hysteretic_spring")],
+        // Relays whose weight depends on the distance of their thresholds only are a sum of plays; skewed ones are Preisach's model as it
+        // stands in the books.
+        Law::Preisach => vec![("prandtl_ishlinskii", "actuator_hysteresis")],
+        Law::AsymmetricHysteresis => vec![("preisach", "actuator_hysteresis")],
         Law::SquareRootDamping => vec![("power_law_damping", "nonlinear_damping")],
         Law::InputOffset if linear => vec![("output_offset", "bias")],
         Law::OutputOffset if linear => vec![("input_offset", "bias")],

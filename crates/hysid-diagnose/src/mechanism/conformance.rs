@@ -97,7 +97,7 @@ pub fn check_form(
             what,
         });
     };
-    for purpose in [Purpose::Screening, Purpose::Refit] {
+    for purpose in [Purpose::Screening, Purpose::Refit, Purpose::Finer] {
         let written = match mechanism.rewrite(simulation, slot, signals, purpose) {
             Ok(written) => written,
             Err(e) => {

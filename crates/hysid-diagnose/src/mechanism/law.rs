@@ -14,6 +14,8 @@ pub enum Purpose {
     Screening,
     /// To be fitted and handed out: the physical parameters.
     Refit,
+    /// The same with more terms, for recordings that are sharp enough to tell: a hysteresis of six plays in place of three.
+    Finer,
 }
 
 /// How the law's text enters the simulation at its slot.

@@ -290,5 +290,6 @@ fn write_law(
         report,
         states,
         sum_of_others: law.sum_of_others,
+        purpose,
     })
 }

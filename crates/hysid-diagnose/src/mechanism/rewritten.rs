@@ -2,7 +2,7 @@
 
 use hysid_plant::{Expr, Simulation, Unit};
 
-use super::Grid;
+use super::{Grid, Purpose};
 
 /// A parameter whose zero is the baseline.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +77,8 @@ pub struct Rewritten {
     pub states: Vec<String>,
     /// Whether the law is the sum of two others of the catalogue.
     pub sum_of_others: bool,
+    /// Which form of the law it is.
+    pub purpose: Purpose,
 }
 
 /// Most joint points of the shape grids.

@@ -247,6 +247,11 @@ impl Simulation {
                 let Expr::Memory(memory, arguments) = e else { return };
                 let constant =
                     |a: &Expr| !a.has_memory() && a.symbols().iter().all(|s| s == "pi" || self.parameter(s).is_some());
+                let nested = |a: &Expr| {
+                    let mut found = false;
+                    a.visit(&mut |e| found |= matches!(e, Expr::Memory(memory, _) if *memory != Memory::Derivative));
+                    found
+                };
                 match memory {
                     Memory::Derivative => {
                         let of_inputs = arguments.iter().all(|a| {
@@ -261,11 +266,23 @@ impl Simulation {
                             );
                         }
                     }
-                    Memory::Delay | Memory::Lag | Memory::Relay | Memory::Play => {
+                    // A half-width may widen with the rate of an input; it must not rest on what moves with the play.
+                    Memory::Play => {
+                        if arguments
+                            .iter()
+                            .skip(1)
+                            .any(|a| a.symbols().iter().any(|s| self.state(s).is_some()) || nested(a))
+                        {
+                            message = Some(
+                                "the half-width of `play` must be made of parameters, numbers and inputs only"
+                                    .to_owned(),
+                            );
+                        }
+                    }
+                    Memory::Delay | Memory::Lag | Memory::Relay => {
                         if !arguments.iter().skip(1).all(constant) {
                             let name = memory.name();
                             let what = match memory {
-                                Memory::Play => "half-width",
                                 Memory::Relay => "thresholds",
                                 Memory::Delay => "delay",
                                 _ => "time constant",

@@ -55,6 +55,13 @@ pub type Case = (
 
 pub const CASES: &[Case] = &[
     (
+        "a play that widens with the rate",
+        "linear",
+        &[("m", 2.0), ("c", 3.0), ("k", 200.0), ("r", 0.2), ("lambda", 0.1)],
+        &[("x", "v", "\"free\""), ("v", "(play(u, r*(1 + lambda*abs(d(u)))) - c*v - k*x)/m", "0.0")],
+        &[("x_m", "x")],
+    ),
+    (
         "oscillator",
         "linear",
         &[("m", 2.0), ("c", 3.0), ("k", 200.0)],

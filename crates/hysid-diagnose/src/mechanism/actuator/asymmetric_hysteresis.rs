@@ -1,6 +1,6 @@
 //! Hysteresis of an actuator with a one-sided characteristic behind it.
 
-use super::{plays, with_radii};
+use super::{how_many, plays, with_radii};
 use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
@@ -13,15 +13,16 @@ pub static ASYMMETRIC_HYSTERESIS: Mechanism = Mechanism {
     applies: anywhere,
     already: &["max(Z - P, 0)"],
     law: |_, purpose| {
+        let count = how_many(purpose);
         let law = match purpose {
             // Linear in its amplitudes: the one-sided part acts on the bare input.
-            Purpose::Screening => Law::replace(format!("u{} + a_h*max(u - u_h, 0)", plays("u", 3))),
-            Purpose::Refit => {
-                let h = format!("(u{})", plays("u", 3));
+            Purpose::Screening => Law::replace(format!("u{} + a_h*max(u - u_h, 0)", plays("u", count))),
+            Purpose::Refit | Purpose::Finer => {
+                let h = format!("(u{})", plays("u", count));
                 Law::replace(format!("{h} + a_h*max({h} - u_h, 0)"))
             }
         };
-        with_radii(law, "u", 3).amplitude("a_h", "1", -0.9, 2.0).shape(
+        with_radii(law, "u", count).amplitude("a_h", "1", -0.9, 2.0).shape(
             "u_h",
             "u",
             Grid::SignedQuantiles("u", vec![0.3, 0.5, 0.7]),

@@ -10,10 +10,18 @@ pub use prandtl_ishlinskii::PRANDTL_ISHLINSKII;
 pub use preisach::PREISACH;
 pub use rate_dependent_hysteresis::RATE_DEPENDENT_HYSTERESIS;
 
-use super::{Grid, Law};
+use super::{Grid, Law, Purpose};
+
+/// Plays in a law: most recordings cannot tell more than three weights.
+fn how_many(purpose: Purpose) -> usize {
+    match purpose {
+        Purpose::Screening | Purpose::Refit => 3,
+        Purpose::Finer => 6,
+    }
+}
 
 /// The radii of the plays as shares of half the input's range.
-const RADII: [&[f64]; 3] = [&[0.1, 0.3, 0.6], &[0.08, 0.2, 0.4, 0.7], &[0.06, 0.15, 0.28, 0.42, 0.58, 0.78]];
+const RADII: [&[f64]; 2] = [&[0.1, 0.3, 0.6], &[0.06, 0.15, 0.28, 0.42, 0.58, 0.78]];
 
 /// `+ p_i*(play(signal, r_i) - signal)` for each play: for large swings the gain stays what it was.
 fn plays(signal: &str, count: usize) -> String {

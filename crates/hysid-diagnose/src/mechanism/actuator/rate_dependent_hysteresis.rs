@@ -1,7 +1,7 @@
 //! Hysteresis of an actuator whose loop widens with the rate.
 
-use super::with_radii;
-use crate::mechanism::{Block, Family, Law, Mechanism, Need, anywhere, log_grid};
+use super::{how_many, with_radii};
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere, log_grid};
 use crate::slot::Place;
 
 /// Hysteresis of an actuator whose loop widens with the rate.
@@ -12,11 +12,19 @@ pub static RATE_DEPENDENT_HYSTERESIS: Mechanism = Mechanism {
     places: &[Place::Input],
     applies: anywhere,
     already: &["lag(play(u, R), P)"],
-    law: |_, _| {
-        let lagged: String = (1..=3).map(|i| format!(" + p_{i}*(lag(play(u, r_{i}), tau) - u)")).collect();
-        with_radii(Law::replace(format!("u{lagged}")), "u", 3)
+    law: |_, purpose| {
+        let count = how_many(purpose);
+        // Plays in series with a lag. Thresholds that grow with the rate do the same to first order, each play by a lag of its own where they
+        // grow in proportion; only sharp recordings tell the difference.
+        let wide = if purpose == Purpose::Finer { "*(1 + lambda*abs(d(u)))" } else { "" };
+        let lagged: String = (1..=count).map(|i| format!(" + p_{i}*(lag(play(u, r_{i}{wide}), tau) - u)")).collect();
+        let law = with_radii(Law::replace(format!("u{lagged}")), "u", count)
             .shape("tau", "h", log_grid(0.5, 50.0, 4))
-            .within(0.05, 1000.0)
+            .within(0.05, 1000.0);
+        match purpose {
+            Purpose::Screening | Purpose::Refit => law,
+            Purpose::Finer => law.shape("lambda", "h/u", Grid::Values(vec![0.0, 5.0])).within(0.0, 1000.0),
+        }
     },
     contains: &["prandtl_ishlinskii", "backlash"],
     confusable: &["prandtl_ishlinskii", "actuator_lag", "viscoelastic"],

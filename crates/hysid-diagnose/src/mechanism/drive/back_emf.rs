@@ -17,7 +17,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
             .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
             .within(0.02, 2000.0),
-        Purpose::Refit => Law::replace("lag(u - k_e*v, tau_e)")
+        Purpose::Refit | Purpose::Finer => Law::replace("lag(u - k_e*v, tau_e)")
             .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
             .within(0.02, 2000.0)

@@ -15,7 +15,7 @@ pub static ACTUATOR_LAG: Mechanism = Mechanism {
         let s = if slot.place == Place::Sensor { "y" } else { "u" };
         let law = match purpose {
             Purpose::Screening => Law::replace(format!("{s} + w*(lag({s}, tau) - {s})")).weight(),
-            Purpose::Refit => Law::replace(format!("lag({s}, tau)")),
+            Purpose::Refit | Purpose::Finer => Law::replace(format!("lag({s}, tau)")),
         };
         law.shape("tau", "h", log_grid(0.5, 50.0, 6)).within(0.02, 2000.0)
     },
