@@ -14,7 +14,7 @@ use crate::file::*;
 use crate::firmness::{firmness, likelihoods};
 use crate::force::pushed;
 use crate::hold::free_run;
-use crate::hypothesis::{Hypothesis, Setting};
+use crate::hypothesis::Setting;
 use crate::intake::{Intake, intake};
 use crate::left::Left;
 use crate::picture::Picture;
@@ -22,7 +22,7 @@ use crate::records::*;
 use crate::reliability::recalibrate;
 use crate::report_values::{reported, sentence};
 use crate::screen::screen;
-use crate::search::{Search, calibrate, gives_up, words};
+use crate::search::{Search, calibrate, words};
 use crate::second_look::{ODDS_AGAINST, unlikely};
 use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, verdict};
 use crate::weigh::*;
@@ -183,9 +183,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if significant && let Some((start, found)) = gross.take() {
         plainly.extend(&start, &found, &mut pool);
         let sets = search.under_noise(&none, &pool);
-        // Nor may the noise model take for noise what the plain squares have explained.
-        let noise = |h: &Hypothesis<'_>| !h.effects.is_empty() && !h.base.gross() && !gives_up(h, &pool, &start);
-        let fine = best_of(&sets).is_some_and(|b| noise(&sets[b]));
+        let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
         if fine {
             pool = sets;
         } else {

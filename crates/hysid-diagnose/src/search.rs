@@ -89,12 +89,6 @@ fn outdone((effects, error): (usize, f64), others: &[(usize, f64)]) -> bool {
     others.iter().any(|&(of, left)| of <= effects && error > GIVEN_UP * left)
 }
 
-/// Whether this set leaves much more than another of no more effects does.
-pub fn gives_up<'d>(h: &Hypothesis<'d>, others: &[Hypothesis<'d>], none: &Hypothesis<'d>) -> bool {
-    let others: Vec<_> = others.iter().map(|o| plain_error(o, none)).collect();
-    outdone(plain_error(h, none), &others)
-}
-
 /// Drops the sets that call noise what others explain, where the simulation is so far off that most of the residual is no noise. A colour can
 /// be found for any residual, and the likelihood of a slow one under its own colour is high.
 fn keep_explaining<'d>(none: &Hypothesis<'d>, pool: &mut Vec<Hypothesis<'d>>) {
