@@ -3,10 +3,14 @@
 use std::ops::Range;
 
 use hysid_linalg::{Columns, Gram, Matrix, Start};
+use rayon::prelude::*;
 
 use crate::kernel::Plan;
 use crate::record::{FIRST_SIGN, differences, next_sign};
 use crate::{Dictionary, DictionaryError, Factor, Quantity, Record, Signal, Term};
+
+/// Samples from which quantities are copied on threads.
+const LONG: usize = 200_000;
 
 /// One stretch of rows: the samples `first..first + len` of one record.
 #[derive(Debug, Clone)]
@@ -69,7 +73,11 @@ impl<'d> Design<'d> {
                     rows += len;
                 }
             }
-            channels.push(quantities.iter().map(|&q| channel(dictionary, record, &whole, q)).collect());
+            let of = |&q: &Quantity| channel(dictionary, record, &whole, q);
+            channels.push(match record.y.len() < LONG {
+                true => quantities.iter().map(of).collect(),
+                false => quantities.par_iter().map(of).collect(),
+            });
         }
         if rows == 0 {
             return Err(DictionaryError::TooShort { longest, lag: reach });

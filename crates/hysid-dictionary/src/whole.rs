@@ -32,10 +32,9 @@ impl Design<'_> {
     /// All inner products; `None` where `columns` columns of the Gram matrix are cheaper, or `y` is not the output of the rows.
     pub(crate) fn whole_gram(&self, y: &[f64], columns: usize) -> Option<Gram> {
         let limit = self.most_classes(columns)?;
-        if !self.is_target(y) {
-            return None;
-        }
-        let distinct = Distinct::within(self.dictionary().terms(), limit)?;
+        let find = || Distinct::within(self.dictionary().terms(), limit);
+        let (own, distinct) = rayon::join(|| self.is_target(y), find);
+        let distinct = distinct.filter(|_| own)?;
         let mut totals = Totals::new(distinct, self.quantities());
         for (record, channels) in self.channels().iter().enumerate() {
             let own = self.stretches().iter().filter(|s| s.record == record);
