@@ -1,4 +1,4 @@
-//! The finer form of a law: more terms of the same series, where the recording is sharp enough to tell them.
+//! The finer form of a law: more terms of the same series, or a start of its own, where the recording is sharp enough to tell them.
 //!
 //! A hysteresis made of plays is a sum over as many as one likes. Three follow a loop that noise blurs; six follow one that stands far above the
 //! noise, where what three leave would pass for another effect. The evidence decides, so that no recording pays for terms that it cannot tell.
@@ -26,6 +26,9 @@ pub fn finer<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, h: &Hypothesis<
         rewrite_at(base, &base.document(), &setting.original, effect.mechanism, label, Purpose::Finer)?;
     let coarse = h.base.values();
     let mut from = with_added_starts(&coarse, &written, &slot, setting.data.stretches.len());
+    for p in &written.simulation.parameters {
+        from.parameters.entry(p.name.clone()).and_modify(|x| *x = x.clamp(p.lower(), p.upper()));
+    }
     for (name, value) in spread(&coarse, &effect.written.amplitudes, &written.amplitudes) {
         from.parameters.insert(name, value);
     }

@@ -14,7 +14,7 @@ pub enum Purpose {
     Screening,
     /// To be fitted and handed out: the physical parameters.
     Refit,
-    /// The same with more terms, for recordings that are sharp enough to tell: a hysteresis of six plays in place of three.
+    /// The same with more in it, for recordings that are sharp enough to tell: six plays in place of three, a lag that does not start settled.
     Finer,
 }
 
@@ -113,6 +113,8 @@ pub enum Start {
     Zero,
     /// As the state that this symbol of the slot stands for; at zero where it stands for something else.
     Like(&'static str),
+    /// Where the recording says.
+    Free,
 }
 
 /// A number that is reported although it is not a parameter of the law.
@@ -300,6 +302,15 @@ impl Law {
     pub fn starting_like(mut self, symbol: &'static str) -> Self {
         if let Some(state) = self.states.last_mut() {
             state.start = Start::Like(symbol);
+        }
+        self
+    }
+
+    /// The last state starts where the recording says.
+    #[must_use]
+    pub fn starting_free(mut self) -> Self {
+        if let Some(state) = self.states.last_mut() {
+            state.start = Start::Free;
         }
         self
     }

@@ -246,6 +246,7 @@ fn write_law(
         let initial = match state.start {
             Start::Zero => Initial::Number(0.0),
             Start::Like(symbol) => like(symbol).unwrap_or(Initial::Number(0.0)),
+            Start::Free => Initial::Free,
         };
         written.states.push(State {
             name,

@@ -7,3 +7,19 @@ mod sensor_lag;
 pub use actuator_lag::ACTUATOR_LAG;
 pub use delay::DELAY;
 pub use sensor_lag::SENSOR_LAG;
+
+use super::{Law, Purpose, log_grid};
+
+/// Shortest time constant of a lag that is written as a state, in samples: the integration must follow it.
+pub(super) const FASTEST: f64 = 0.4;
+
+/// A first-order lag of `signal`, settled at the first sample; in its finer form it starts where the recording says, as after switching on.
+fn first_order(signal: &str, purpose: Purpose) -> Law {
+    let law = match purpose {
+        Purpose::Screening => Law::replace(format!("{signal} + w*(lag({signal}, tau) - {signal})")).weight(),
+        Purpose::Refit => Law::replace(format!("lag({signal}, tau)")),
+        Purpose::Finer => Law::replace("s_l").state("s_l", signal, format!("({signal} - s_l)/tau")).starting_free(),
+    };
+    let fastest = if purpose == Purpose::Finer { FASTEST } else { 0.02 };
+    law.shape("tau", "h", log_grid(0.5, 50.0, 6)).within(fastest, 2000.0)
+}

@@ -1,6 +1,7 @@
 //! A sensor that follows with a first-order lag.
 
-use crate::mechanism::{Block, Family, Law, Mechanism, Need, Purpose, anywhere, log_grid};
+use super::first_order;
+use crate::mechanism::{Block, Family, Mechanism, Need, anywhere};
 use crate::slot::Place;
 
 /// A sensor that follows with a first-order lag.
@@ -13,11 +14,7 @@ pub static SENSOR_LAG: Mechanism = Mechanism {
     already: &["lag(u, P)", "lag(y, P)"],
     law: |slot, purpose| {
         let s = if slot.place == Place::Sensor { "y" } else { "u" };
-        let law = match purpose {
-            Purpose::Screening => Law::replace(format!("{s} + w*(lag({s}, tau) - {s})")).weight(),
-            Purpose::Refit | Purpose::Finer => Law::replace(format!("lag({s}, tau)")),
-        };
-        law.shape("tau", "h", log_grid(0.5, 50.0, 6)).within(0.02, 2000.0)
+        first_order(s, purpose)
     },
     contains: &[],
     confusable: &["delay", "actuator_lag", "viscoelastic"],
