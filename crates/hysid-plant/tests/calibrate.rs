@@ -6,11 +6,12 @@ use hysid_plant::{Compiled, Data, Drive, Effort, Flag, Run, Settings, Simulation
 use hysid_signal::{Excitation, white_noise};
 
 /// A simulation text and the true parameters of its data.
-struct Case {
-    name: &'static str,
-    text: &'static str,
-    truth: &'static [f64],
-    initial: &'static [f64],
+#[derive(Clone, Copy)]
+struct Case<'a> {
+    name: &'a str,
+    text: &'a str,
+    truth: &'a [f64],
+    initial: &'a [f64],
     input: fn(usize, f64) -> Vec<f64>,
     noise: f64,
     /// Largest relative error of a parameter.
@@ -109,7 +110,7 @@ x1_m = "x1"
 x2_m = "x2"
 "#;
 
-const CASES: &[Case] = &[
+const CASES: &[Case<'static>] = &[
     Case {
         name: "resonant oscillator",
         text: RESONANT,
@@ -168,7 +169,7 @@ fn noisy(clean: &[f64], noise: f64, seed: u64) -> Vec<f64> {
     clean.iter().zip(e).map(|(y, e)| y + e).collect()
 }
 
-fn data(case: &Case, compiled: &Compiled, n: usize, seed: u64) -> Data {
+fn data(case: &Case<'_>, compiled: &Compiled, n: usize, seed: u64) -> Data {
     let drive = Drive::new(0.0, 0.01, n, vec![(case.input)(n, 5.0)]).expect("valid");
     let run = Run::new(&drive, case.truth).from(Start::Document(case.initial)).with_substeps(8);
     let clean = compiled.simulate(&run);
@@ -202,6 +203,21 @@ fn parameters_are_found_from_wrong_starts() {
             });
             assert_eq!(covered.count(), case.truth.len(), "{}: intervals", case.name);
         }
+    }
+}
+
+#[test]
+fn what_is_behind_a_converter_is_calibrated() {
+    let coarse = RESONANT
+        .replace("x_m = \"x\"", "x_m = \"q*floor(x/q + 0.5)\"")
+        .replace("[states]", "q = { value = 0.02, fixed = true }\n[states]");
+    let case = Case { text: &coarse, noise: 0.002, name: "converter", ..CASES[0] };
+    let compiled = compile(case.text);
+    let truth = [2.0, 1.2, 200.0, 0.02];
+    let data = data(&Case { truth: &truth, ..case }, &compiled, 2000, 7);
+    let result = compiled.calibrate(&[data], &Settings::default()).expect("calibrates");
+    for (found, truth) in result.theta.iter().zip(truth) {
+        assert!((found / truth - 1.0).abs() < 0.01, "{:?} for {truth}", result.theta);
     }
 }
 

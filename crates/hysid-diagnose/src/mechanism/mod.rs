@@ -14,6 +14,7 @@ mod excitation;
 mod family;
 mod law;
 mod page;
+mod resolution;
 mod rewrite;
 mod rewritten;
 mod sentence;

@@ -8,6 +8,7 @@ use std::ops::Range;
 use hysid_plant::{BinaryOp, Expr, Function};
 
 use super::Grid;
+use super::resolution::resolution;
 
 /// The signals at one slot: the baseline's run on the recordings, in the symbols of the slot.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,23 +179,9 @@ impl Signals {
         (low, high)
     }
 
-    /// The step between recorded values, where the recorded output has visibly few of them.
+    /// The step of the recorded output, where it shows one.
     pub fn resolution(&self) -> Option<f64> {
-        let mut values: Vec<f64> = self.measured.as_ref()?.iter().copied().filter(|v| v.is_finite()).collect();
-        let count = values.len();
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        // A series of continuous values has next to no repetitions.
-        if count < 50 || values.len() * 3 > count {
-            return None;
-        }
-        let mut gaps: Vec<f64> = values.windows(2).filter_map(|w| Some(w.get(1)? - w.first()?)).collect();
-        gaps.sort_by(f64::total_cmp);
-        // The smallest gap, averaged over those that are the same step written with few digits.
-        let first = *gaps.first()?;
-        let median = *gaps.get(gaps.len() / 2)?;
-        let step = if median < 1.5 * first { median } else { first };
-        (step > 0.0).then_some(step)
+        resolution(self.measured.as_ref()?)
     }
 }
 

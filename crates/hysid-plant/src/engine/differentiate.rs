@@ -51,7 +51,9 @@ pub(super) fn derivative(expr: &Expr, symbol: &str) -> Expr {
                 Function::Log10 => one / (u * std::f64::consts::LN_10),
                 Function::Sqrt => Expr::Number(0.5) / expr.clone(),
                 Function::Abs => u.sign(),
-                Function::Sign | Function::Step | Function::Floor => return Expr::Number(0.0),
+                Function::Sign | Function::Step => return Expr::Number(0.0),
+                // The slope of its mean, as in the evaluation.
+                Function::Floor => one,
                 Function::Atan2 | Function::Min | Function::Max => {
                     let Some(b) = arguments.get(1) else { return Expr::Number(0.0) };
                     let (w, da, db) = (b.clone(), d(a), d(b));

@@ -77,7 +77,9 @@ pub(super) fn value_and_slope(function: Function, x: f64) -> (f64, f64) {
         Function::Log10 => finite(1.0 / (x * std::f64::consts::LN_10)),
         Function::Sqrt => finite(0.5 / y),
         Function::Abs => sign(x),
-        Function::Sign | Function::Floor | Function::Step => 0.0,
+        Function::Sign | Function::Step => 0.0,
+        // The slope of its mean: see the module.
+        Function::Floor => 1.0,
         Function::Atan2 | Function::Min | Function::Max => f64::NAN,
     };
     (y, slope)
