@@ -15,12 +15,13 @@ use crate::base::Base;
 use crate::budget::Step;
 use crate::data::DataSet;
 use crate::evidence::{Whitener, norm2};
-use crate::file::ExperimentRecord;
+use crate::file::{AlternativeRecord, ExperimentRecord, finite};
 use crate::hypothesis::{Hypothesis, Setting};
 use crate::mechanism::excited_band;
 use crate::model::{Model, Values};
 use crate::refit::{LmOptions, levenberg_marquardt};
 use crate::text::number;
+use crate::weigh::{Contest, rivals_of, settled};
 
 /// Below this two explanations cannot be told apart.
 pub const SAME: f64 = 9.0;
@@ -60,7 +61,7 @@ fn distance(
 }
 
 /// Squared distance of `rival` from `winner` on the estimation data.
-pub fn present_separation(setting: &Setting<'_>, winner: &Hypothesis<'_>, rival: &Hypothesis<'_>) -> Option<f64> {
+fn present_separation(setting: &Setting<'_>, winner: &Hypothesis<'_>, rival: &Hypothesis<'_>) -> Option<f64> {
     let truth = winner.base.model.predict(&winner.base.fit.theta)?;
     let data = setting.data.with_outputs(truth);
     distance(
@@ -191,8 +192,44 @@ fn worded(shape: &str) -> String {
     if shape == RECORDED || shape == STEPS { shape.to_owned() } else { format!("a {shape}") }
 }
 
+/// The experiment that would separate the winner from what contradicts it; how far apart they are on this recording is told with the alternatives.
+pub fn separating(
+    setting: &Setting<'_>,
+    contest: &Contest<'_, '_>,
+    alternatives: &mut [AlternativeRecord],
+    seed: u64,
+    expired: &dyn Fn(f64) -> bool,
+) -> Option<ExperimentRecord> {
+    let Contest { pool, probability, winner, .. } = *contest;
+    let mut found: Option<ExperimentRecord> = None;
+    for rival in rivals_of(contest) {
+        let present = present_separation(setting, &pool[winner], &pool[rival]);
+        if let Some(d) = present {
+            for e in &pool[rival].effects {
+                let listed = alternatives.iter_mut().find(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
+                if let Some(a) = listed {
+                    a.separation = finite(d);
+                }
+            }
+        }
+        if settled(probability[winner], probability[rival], present) {
+            continue;
+        }
+        let proposed = propose(setting, &pool[winner], &pool[rival], present, seed);
+        let separable = proposed.as_ref().is_some_and(|p| p.separable);
+        if separable || found.is_none() {
+            found = proposed;
+        }
+        // Where the first cannot be told from the winner by any input, the second may be worth an experiment.
+        if separable || expired(1.0) {
+            break;
+        }
+    }
+    found
+}
+
 /// The experiment that would best separate two explanations.
-pub fn propose(
+fn propose(
     setting: &Setting<'_>,
     a: &Hypothesis<'_>,
     b: &Hypothesis<'_>,

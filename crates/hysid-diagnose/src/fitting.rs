@@ -13,6 +13,7 @@ use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::{Mechanism, Purpose};
 use crate::model::Values;
 use crate::screen::{Candidate, rewrite_at, with_added_starts};
+use crate::unfold::calibrated_unfolded;
 
 /// Points of a shape grid that a refit starts from.
 const MOST_POINTS: usize = 3;
@@ -101,7 +102,8 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
             for p in &mut document.parameters {
                 p.value = own.parameters.get(&p.name).copied().unwrap_or(p.value);
             }
-            if let Some((found, _)) = calibrated_copy(&document, setting.data, 1) {
+            let restored = calibrated_unfolded(&setting.original, &document, setting.data);
+            if let Some(found) = restored.or_else(|| calibrated_copy(&document, setting.data, 1).map(|c| c.0)) {
                 let mut global = own.clone();
                 global.parameters.extend(found.parameters.iter().map(|p| (p.name.clone(), p.value)));
                 out.push(global);

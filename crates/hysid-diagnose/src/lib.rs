@@ -42,6 +42,7 @@ mod search;
 mod second_look;
 mod text;
 mod thinning;
+mod unfold;
 mod weigh;
 
 pub use bootstrap::{Ratio, ratio_of_rms, rms};

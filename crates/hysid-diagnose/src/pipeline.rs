@@ -9,7 +9,7 @@ use crate::compose::{add, best_of};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
 use crate::evidence::correlation_time;
-use crate::experiment::{present_separation, propose};
+use crate::experiment::separating;
 use crate::file::*;
 use crate::firmness::{firmness, likelihoods};
 use crate::force::pushed;
@@ -20,7 +20,6 @@ use crate::left::Left;
 use crate::picture::Picture;
 use crate::records::*;
 use crate::reliability::recalibrate;
-use crate::report_values::{reported, sentence};
 use crate::screen::screen;
 use crate::search::{Search, calibrate, words};
 use crate::second_look::{ODDS_AGAINST, unlikely};
@@ -229,39 +228,13 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         file.verdict = VerdictKind::Ambiguous;
     }
     let best = &pool[winner];
-    file.effects = best
-        .effects
-        .iter()
-        .zip(&support)
-        .map(|(e, s)| {
-            let parameters = reported(&best.base, e);
-            EffectRecord {
-                mechanism: e.mechanism.id.into(),
-                family: e.mechanism.family.name().into(),
-                slot: e.slot.label.clone(),
-                probability: s.mechanism,
-                family_probability: s.family,
-                support: s.mechanism,
-                family_support: s.family,
-                concealment: e.concealment,
-                sentence: sentence(e, &parameters),
-                parameters,
-            }
-        })
-        .collect();
+    let contest = Contest { pool: &pool, weighed: &weighed, probability: &probability, winner };
+    file.effects = effects(best, &support);
     if significant {
-        file.alternatives = alternatives(&pool, &weighed, &probability, winner, file.verdict);
+        file.alternatives = alternatives(&contest, file.verdict);
         file.location = location(&pool[0], best, &candidates);
-        // A change at one moment is where the recordings part from then on.
-        let moment = file
-            .effects
-            .iter()
-            .filter(|e| e.mechanism == "abrupt_change")
-            .find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"));
-        if let (Some(l), Some(moment), Some(last)) =
-            (&mut file.location, moment, data.stretches.iter().rfind(|s| s.recording == 0))
-        {
-            l.time_s = vec![[moment.value, last.start_s + last.len() as f64 * data.period_s]];
+        if let (Some(l), Some(parted)) = (&mut file.location, from_moment(&file.effects, &data)) {
+            l.time_s = vec![parted];
         }
         let noise = best.base.whitener.models.iter().map(|m| m.noise_rms()).collect::<Vec<_>>();
         file.mismatch.noise_rms = by_column(simulation, &noise);
@@ -281,30 +254,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         && !budget.omits(Step::Experiment)
     {
         (hooks.progress)("looking for an experiment");
-        for rival in rivals_of(&pool, &weighed, &probability, winner) {
-            let present = present_separation(setting, best, &pool[rival]);
-            if let Some(d) = present {
-                for e in &pool[rival].effects {
-                    let listed =
-                        file.alternatives.iter_mut().find(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
-                    if let Some(a) = listed {
-                        a.separation = finite(d);
-                    }
-                }
-            }
-            if settled(probability[winner], probability[rival], present) {
-                continue;
-            }
-            let proposed = propose(setting, best, &pool[rival], present, options.seed);
-            let separable = proposed.as_ref().is_some_and(|p| p.separable);
-            if separable || file.experiment.is_none() {
-                file.experiment = proposed;
-            }
-            // Where the first cannot be told from the winner by any input, the second may be worth an experiment.
-            if separable || (hooks.expired)(1.0) {
-                break;
-            }
-        }
+        file.experiment = separating(setting, &contest, &mut file.alternatives, options.seed, hooks.expired);
     }
     file.remaining = left.record(&pool, winner);
     if left.is_outside(&support, file.remaining.as_ref()) && !budget.unfinished() {
@@ -340,13 +290,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
-    for e in &best.effects {
-        let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label);
-        if let Some(lacking) = candidate.and_then(|c| c.lacking.as_ref()) {
-            file.notes
-                .push(format!("{}: for a firmer answer the recording lacks something: {lacking}", e.mechanism.id));
-        }
-    }
+    file.notes.extend(lacking(best, &candidates));
     file.summary = summary(&file);
     if let Some(note) = budget.note() {
         if unexplained {

@@ -10,14 +10,15 @@ use crate::data::DataSet;
 use crate::evidence::{FeatureGroup, detectable_amplitude};
 use crate::file::*;
 use crate::hold::FreeRun;
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Effect, Hypothesis};
 use crate::locate;
 use crate::mechanism::number_with_unit;
 use crate::pipeline::Question;
 use crate::report_values::{reported, sentence};
 use crate::screen::Candidate;
 use crate::search::words;
-use crate::verdict::Hypothesis as Weighed;
+use crate::verdict::Support;
+use crate::weigh::Contest;
 
 pub fn by_column(simulation: &Simulation, values: &[f64]) -> BTreeMap<String, f64> {
     simulation.outputs.iter().map(|o| o.column.clone()).zip(values.iter().copied()).collect()
@@ -54,14 +55,47 @@ pub fn detectability(candidates: &[Candidate]) -> Vec<DetectableRecord> {
     out
 }
 
+/// The effects of the best set.
+pub fn effects(best: &Hypothesis<'_>, support: &[Support]) -> Vec<EffectRecord> {
+    let record = |(e, s): (&Effect, &Support)| {
+        let parameters = reported(&best.base, e);
+        EffectRecord {
+            mechanism: e.mechanism.id.into(),
+            family: e.mechanism.family.name().into(),
+            slot: e.slot.label.clone(),
+            probability: s.mechanism,
+            family_probability: s.family,
+            support: s.mechanism,
+            family_support: s.family,
+            concealment: e.concealment,
+            sentence: sentence(e, &parameters),
+            parameters,
+        }
+    };
+    best.effects.iter().zip(support).map(record).collect()
+}
+
+/// From when on the recordings part, where a change at one moment is among the effects: its moment to the end of the first recording.
+pub fn from_moment(effects: &[EffectRecord], data: &DataSet) -> Option<[f64; 2]> {
+    let changes = || effects.iter().filter(|e| e.mechanism == "abrupt_change");
+    let moment = changes().find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"))?;
+    let last = data.stretches.iter().rfind(|s| s.recording == 0)?;
+    Some([moment.value, last.start_s + last.len() as f64 * data.period_s])
+}
+
+/// What the recording lacks for a firmer answer about the effects of the best set.
+pub fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<String> {
+    let told = |e: &Effect| {
+        let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?;
+        let lacking = candidate.lacking.as_ref()?;
+        Some(format!("{}: for a firmer answer the recording lacks something: {lacking}", e.mechanism.id))
+    };
+    best.effects.iter().filter_map(told).collect()
+}
+
 /// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it.
-pub fn alternatives(
-    pool: &[Hypothesis<'_>],
-    weighed: &[Weighed],
-    probability: &[f64],
-    winner: usize,
-    kind: VerdictKind,
-) -> Vec<AlternativeRecord> {
+pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<AlternativeRecord> {
+    let Contest { pool, weighed, probability, winner } = *contest;
     let mut out: Vec<AlternativeRecord> = Vec::new();
     let mut order: Vec<usize> = (0..pool.len()).collect();
     order.sort_by(|&a, &b| weighed[b].log_evidence.total_cmp(&weighed[a].log_evidence));

@@ -33,9 +33,23 @@ pub fn weigh(h: &Hypothesis<'_>) -> Weighed {
     }
 }
 
+/// The sets that were fitted, as they stand against each other.
+#[derive(Debug, Clone, Copy)]
+pub struct Contest<'a, 'd> {
+    /// The sets; the first is the simulation without effects.
+    pub pool: &'a [Hypothesis<'d>],
+    /// Their claims and evidence.
+    pub weighed: &'a [Weighed],
+    /// Their probabilities.
+    pub probability: &'a [f64],
+    /// The one that is told.
+    pub winner: usize,
+}
+
 /// Sets that contradict the winner, one by evidence and one by probability: each names a mechanism that the other does not (a set with more or
 /// fewer members than the winner says the same of those that they share). Two, since one of them is often the winner's law in other words.
-pub fn rivals_of(pool: &[Hypothesis<'_>], weighed: &[Weighed], probability: &[f64], winner: usize) -> Vec<usize> {
+pub fn rivals_of(contest: &Contest<'_, '_>) -> Vec<usize> {
+    let Contest { pool, weighed, probability, winner } = *contest;
     let lacks = |i: usize, j: usize| {
         pool[i].effects.iter().any(|e| pool[j].effects.iter().all(|other| other.mechanism.id != e.mechanism.id))
     };
