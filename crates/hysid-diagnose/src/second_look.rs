@@ -39,9 +39,16 @@ pub fn unlikely(open: &OpenSet, odds_against: f64) -> f64 {
 }
 
 impl<'d> Search<'_, 'd> {
-    /// The likeliest effects and pairs, fitted.
+    /// The likeliest effects and pairs, fitted; and what is there or not (a sensor that shows the size only), of which no derivative at
+    /// nothing tells how likely it is.
     pub fn glance(&self, start: &Hypothesis<'d>, candidates: &[Candidate]) -> Vec<Hypothesis<'d>> {
-        let mut fitted = refit_all(self.setting, start, &short_list(candidates, LOOKED_AT.0));
+        let mut list = short_list(candidates, LOOKED_AT.0);
+        for c in candidates.iter().filter(|c| c.refit.amplitudes.is_empty() && c.refit.shapes.is_empty()) {
+            if c.lacking.is_none() && list.iter().all(|l| l.key() != c.key()) {
+                list.push(c);
+            }
+        }
+        let mut fitted = refit_all(self.setting, start, &list);
         fitted.extend(superposed(self.setting, start, candidates, LOOKED_AT.1));
         fitted
     }
