@@ -9,13 +9,15 @@ use hysid_plant::{Expr, Function, Simulation};
 use crate::calibrate::calibrated_copy;
 use crate::data::DataSet;
 
+/// The sign of a sample beside that of its neighbour: the same, or the other.
+const SIGNS: [f64; 2] = [1.0, -1.0];
+
 /// Signs for the samples of `sizes`, the first of which is positive, that make the series smoothest: exact, by dynamic programming over whether
 /// neighbours differ in sign.
 fn unfold(sizes: &[f64]) -> Vec<f64> {
     // Cost of the best signs up to here whose last two agree, and of those whose last two differ; and where they came from.
     let mut cost = [0.0, 0.0];
     let mut came: Vec<[usize; 2]> = Vec::with_capacity(sizes.len());
-    const SIGNS: [f64; 2] = [1.0, -1.0];
     for w in sizes.windows(3) {
         let [a, b, c] = [w[0], w[1], w[2]];
         let step = |before: usize, now: usize| (SIGNS[now] * c - 2.0 * b + SIGNS[before] * a).powi(2);
@@ -50,7 +52,7 @@ pub fn calibrated_unfolded(original: &Simulation, rectified: &Simulation, data: 
         return None;
     }
     let restored = unfold(sizes);
-    let best = [1.0, -1.0]
+    let best = SIGNS
         .into_iter()
         .filter_map(|sign| {
             let mut outputs = stretch.outputs.clone();

@@ -124,6 +124,7 @@ mod tests {
         let y: Vec<f64> = (0..1000).map(|i| (i as f64 * 0.7).sin()).collect();
         assert_eq!(held_out_blocks(&layout, &y).iter().filter(|w| **w == 0.0).count(), 300);
     }
+
     #[test]
     fn the_block_that_the_initial_state_is_estimated_on_stays() {
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..1000 }], outputs: 1 };

@@ -1,8 +1,9 @@
 //! The numbers that equations are evaluated in: values and their tangents, of one run or of several in lanes.
 //!
 //! Derivatives are defined on purpose where a function has none: `abs`, `sign` and `step` have derivative 0 at their kinks and
-//! jumps; `floor` has the slope of its mean, 1, since its own, 0, would hide what is behind a converter from every fit; `min` and `max` follow their first argument in a tie; a root or a power whose slope at 0 is infinite has
-//! slope 0 there, and the slope of `a^b` in `b` is 0 at `a = 0`. Values follow IEEE 754: what is not finite ends a simulation.
+//! jumps; `floor` has the slope of its mean, 1, since its own, 0, would hide what is behind a converter from every fit; `min` and
+//! `max` follow their first argument in a tie; a root or a power whose slope at 0 is infinite has slope 0 there, and the slope of
+//! `a^b` in `b` is 0 at `a = 0`. Values follow IEEE 754: what is not finite ends a simulation.
 
 mod functions;
 mod lanes;
