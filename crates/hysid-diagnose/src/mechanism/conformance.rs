@@ -35,7 +35,8 @@ specimens!(
     "wing",
     "motor",
     "filter",
-    "controlled_damper"
+    "controlled_damper",
+    "stalling_wing"
 );
 
 /// A breach of the suite's laws.
@@ -199,6 +200,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.02, 6.0),
     (1e-5, 0.5),
     (0.01, 4.0),
+    (0.01, 16.0),
 ];
 
 /// A bench for each specimen.

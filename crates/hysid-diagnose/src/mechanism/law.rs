@@ -36,6 +36,14 @@ pub enum Change {
         /// Added to the mass.
         mass: String,
     },
+    /// The flow separation that the simulation has as a function of the angle: `by` stands in its place, in which `steady` is what stood
+    /// there and `ahead` the same at the angle `at`.
+    Separation {
+        /// The angle that decides, in place of `x`.
+        at: String,
+        /// What stands for the function.
+        by: String,
+    },
 }
 
 /// The values that a shape parameter is tried at.
@@ -180,6 +188,11 @@ impl Law {
     /// A mass that is not constant and the force that comes with it.
     pub fn inertia(force: impl Into<String>, mass: impl Into<String>) -> Self {
         Self::new(Change::Inertia { force: force.into(), mass: mass.into() })
+    }
+
+    /// What stands instead of the separation that the simulation has as a function of its angle.
+    pub fn separation(at: impl Into<String>, by: impl Into<String>) -> Self {
+        Self::new(Change::Separation { at: at.into(), by: by.into() })
     }
 
     /// The weight `w` of a screening form; not reported.

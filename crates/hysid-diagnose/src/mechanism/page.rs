@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::conformance::specimens;
 use super::{Change, Family, Grid, Law, Mechanism, Purpose, Role, catalogue};
-use crate::slot::{Place, Structure};
+use crate::slot::{Place, Slot, Structure};
 
 fn law_text(law: &Law) -> String {
     match &law.change {
@@ -13,6 +13,9 @@ fn law_text(law: &Law) -> String {
         Change::Outflow(text) => format!("outflow `{text}`"),
         Change::Replace(text) => format!("becomes `{text}`"),
         Change::Inertia { force, mass } => format!("further mass `{mass}` with the force `{force}`"),
+        Change::Separation { at, by } => {
+            format!("the simulation's own separation becomes `{by}`, where `ahead` is the separation at `{at}`")
+        }
     }
 }
 
@@ -79,29 +82,39 @@ pub fn catalogue_page() -> String {
     page
 }
 
+/// One form of a law, with the form that it is screened in.
+fn form(refit: &Law, screening: &Law) -> String {
+    let mut text = law_text(refit);
+    if screening.change != refit.change {
+        let _ = write!(text, "; screened as {}", law_text(screening));
+    }
+    for state in &refit.states {
+        let _ = write!(text, "; state {}' = `{}`", state.name, state.derivative);
+    }
+    let _ = write!(text, "\n  - parameters: {}", parameters(refit));
+    text
+}
+
 fn entry(page: &mut String, mechanism: &Mechanism, structures: &[Structure]) {
     let _ = write!(page, "\n### {}\n\n{}\n\n", mechanism.id, mechanism.signature);
     let mut told: Vec<String> = Vec::new();
     for place in mechanism.places {
-        let mut slots = structures.iter().flat_map(|s| mechanism.slots(s));
-        let Some(slot) = slots.find(|s| s.place == *place) else { continue };
-        let refit = mechanism.law_at(&slot, Purpose::Refit);
-        let screening = mechanism.law_at(&slot, Purpose::Screening);
-        let mut text = law_text(&refit);
-        if screening.change != refit.change {
-            let _ = write!(text, "; screened as {}", law_text(&screening));
-        }
-        for state in &refit.states {
-            let _ = write!(text, "; state {}' = `{}`", state.name, state.derivative);
-        }
-        let _ = write!(text, "\n  - parameters: {}", parameters(&refit));
-        match told.iter().position(|t| t.ends_with(&text)) {
-            Some(at) => {
-                if let Some(t) = told.get_mut(at) {
-                    *t = format!("{}, {t}", place_name(*place));
+        let slots: Vec<Slot> =
+            structures.iter().flat_map(|s| mechanism.slots(s)).filter(|s| s.place == *place).collect();
+        let Some(first) = slots.first() else { continue };
+        let refitted = |slot: &Slot| mechanism.law_at(slot, Purpose::Refit);
+        // A simulation that has the separation itself takes another law.
+        let stalling = slots.iter().find(|s| s.separation().is_some() && refitted(s).change != refitted(first).change);
+        for slot in std::iter::once(first).chain(stalling) {
+            let text = form(&refitted(slot), &mechanism.law_at(slot, Purpose::Screening));
+            match told.iter().position(|t| t.ends_with(&text)) {
+                Some(at) => {
+                    if let Some(t) = told.get_mut(at) {
+                        *t = format!("{}, {t}", place_name(*place));
+                    }
                 }
+                None => told.push(format!("{}: {text}", place_name(*place))),
             }
-            None => told.push(format!("{}: {text}", place_name(*place))),
         }
     }
     for text in told {

@@ -132,6 +132,7 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             }
             Ok(())
         }
+        (_, Change::Separation { at, by }) => separation(simulation, slot, (at, by), writer),
         (Target::Derivatives(states), Change::Inertia { force, mass }) => {
             let (force, more) = (writer.text(force)?, writer.text(mass)?);
             for (name, _) in states {
@@ -154,6 +155,34 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
         }
         _ => Err("this kind of law cannot stand at this kind of slot".to_owned()),
     }
+}
+
+/// The separation of the slot's equations, wherever it stands, as the law has it.
+fn separation(
+    simulation: &mut Simulation,
+    slot: &Slot,
+    (at, by): (&str, &str),
+    writer: &Writer<'_>,
+) -> Result<(), String> {
+    let steady = slot.separation().cloned().ok_or("the equations here have no separation")?;
+    let Some(Expr::Symbol(angle)) = slot.quantity("x").map(|q| q.expression.clone()) else {
+        return Err("the angle is no signal of its own".to_owned());
+    };
+    let ahead = steady.substitute(&angle, &writer.text(at)?);
+    let mut inner = Writer { slot, own: writer.own.clone() };
+    for name in ["steady", "ahead"] {
+        inner.own.insert(name.to_owned(), name.to_owned());
+    }
+    let mut by = inner.text(by)?;
+    for (name, part) in [("steady", &steady), ("ahead", &ahead)] {
+        by = by.substitute(name, part);
+    }
+    // What was put in is not looked through again: it holds the function that it stands for.
+    let held = Expr::symbol("?held");
+    simulation.map_equations(|e| {
+        e.map(&mut |part| if part == steady { held.clone() } else { part }).substitute("?held", &by)
+    });
+    Ok(())
 }
 
 impl Mechanism {

@@ -177,6 +177,12 @@ impl Slot {
         self.context.iter().any(|e| pattern::occurs(&form, e))
     }
 
+    /// The share of attached flow, or of separated flow, that the equations here have as a function of the angle.
+    pub(crate) fn separation(&self) -> Option<&Expr> {
+        let Some(Quantity { expression: Expr::Symbol(x), .. }) = self.symbols.get("x") else { return None };
+        self.context.iter().find_map(|e| pattern::step_in(e, x))
+    }
+
     /// Whether the equations here contain a square root of an expression that uses this symbol.
     pub(crate) fn shows_root(&self, symbol: &str) -> bool {
         let Some(quantity) = self.symbols.get(symbol) else { return false };

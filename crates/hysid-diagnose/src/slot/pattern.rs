@@ -45,6 +45,18 @@ pub(super) fn occurs(form: &Expr, expr: &Expr) -> bool {
     found
 }
 
+/// The first part of `expr` that is a smooth step in this symbol, `1/(1 + exp(Z))`, and holds no memory.
+pub(super) fn step_in<'e>(expr: &'e Expr, symbol: &str) -> Option<&'e Expr> {
+    let step = prepare("1/(1 + exp(Z))", |_| None)?;
+    let mut found = None;
+    expr.visit(&mut |e| {
+        if found.is_none() && e.uses(symbol) && matches(&step, e) && !e.has_memory() {
+            found = Some(e);
+        }
+    });
+    found
+}
+
 /// The factors above the line of a product.
 fn factors(expr: &Expr) -> Vec<&Expr> {
     match expr {

@@ -89,6 +89,7 @@ fn a_mechanism_is_recovered_from_its_own_simulation() {
     check("Circuit", "input_saturation");
     check("Controlled", "coulomb_friction");
     check("Controlled", "dahl_friction");
+    check("Stalling", "stall_lag");
     // Between the two filters.
     check_at("Circuit", "input_saturation", 1);
 }
@@ -128,6 +129,26 @@ fn what_a_part_passes_on_is_one_signal_however_many_states_it_is_made_of() {
     check("w*(p + T*r - q)", &["p + T*r"]);
     check("w*(p - T*r - q)", &["p - T*r"]);
     check("w*(p - q) + w*T*abs(r)", &["p", "r"]);
+}
+
+/// A steady curve that has the separation in it gets its lag there, and nothing else changes.
+#[test]
+fn separation_lags_where_the_simulation_has_it() {
+    let simulation = specimens().into_iter().find(|s| s.title.starts_with("Stalling")).unwrap();
+    let mechanism = crate::mechanism::mechanism("stall_lag").unwrap();
+    let slot = mechanism.slots(&Structure::of(&simulation)).remove(0);
+    let signals = example_signals(&simulation, &slot);
+    let check = |purpose, expected: &str| {
+        let written = mechanism.rewrite(&simulation, &slot, &signals, purpose).unwrap();
+        let expected = format!("cna*sin((alpha - a_0)*pi/180)*(1 + sqrt({expected}))^2/4");
+        assert_eq!(written.simulation.outputs[0].expression.to_string(), expected);
+        assert!(!mechanism.slots(&Structure::of(&written.simulation)).iter().any(|s| !mechanism.is_in(s)));
+    };
+    let at = |angle: &str| format!("1/(1 + exp(s*({angle} - a_s)))");
+    let (steady, ahead) = (at("alpha"), at("alpha - tau_2*d(alpha)"));
+    check(Purpose::Refit, &format!("lag({steady}, tau_1)"));
+    check(Purpose::Finer, &format!("lag({ahead}, tau_1)"));
+    check(Purpose::Screening, &format!("{steady} + w*(lag({ahead}, tau_1) - {steady})"));
 }
 
 /// Only where the simulation's own damping follows an input do friction and hysteresis follow it.
