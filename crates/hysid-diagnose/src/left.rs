@@ -9,7 +9,7 @@ use crate::hypothesis::{Hypothesis, block_score};
 use crate::openset::OpenSet;
 use crate::records::noise_floor;
 use crate::search::Search;
-use crate::second_look::{ODDS_AGAINST_MORE, unlikely};
+use crate::second_look::{ODDS_AGAINST, ODDS_AGAINST_MORE, unlikely};
 use crate::verdict::{FIRM, Support};
 use crate::weigh::better_by_chance;
 
@@ -29,6 +29,8 @@ pub struct Left {
     test: Option<SurrogateTest>,
     /// Generic terms for the residual; `None` where no mismatch is significant or no term is chosen.
     open: Option<OpenSet>,
+    /// The same in place of the set, where that explains far more.
+    instead: Option<OpenSet>,
     /// Whether generic terms explain so much that the set is an imitation.
     pub foreign: bool,
     /// Whether something significant is left.
@@ -46,15 +48,15 @@ impl Left {
         let open = if significant { search.open(best) } else { None };
         let seen = open.as_ref().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
         let explained = best.log_evidence - none.log_evidence;
-        let alone = || {
-            let open = search.open(none).filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
-            open.is_some_and(|o| o.gain > explained + FAR_MORE)
-        };
-        let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || alone());
+        let instead = if winner > 0 { search.open(none) } else { None };
+        let instead = instead.filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE);
+        let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || instead.is_some());
         // What was not looked at is not known to be nothing.
         let significant = |t: &SurrogateTest| t.p_value < alpha;
         let imperfect = winner > 0 && (foreign || seen.is_some() || test.as_ref().is_none_or(significant));
-        Self { test, open, foreign, imperfect, alpha }
+        // What is told of an imitation is what it imitates, where that is more than what it leaves.
+        let instead = instead.filter(|i| i.gain > explained + open.as_ref().map_or(0.0, |o| o.gain));
+        Self { test, open, instead, foreign, imperfect, alpha }
     }
 
     /// As it is reported; `None` where it was not looked at.
@@ -69,8 +71,8 @@ impl Left {
     /// Whether the mismatch is none of the catalogue: no set stands and a correction does, the set is an imitation, or most of the mismatch
     /// is left. An effect that is really there is still named; what most of the mismatch is decides.
     pub fn is_outside(&self, support: &[Support], remaining: Option<&RemainingRecord>) -> bool {
+        let Some(remaining) = remaining else { return self.open.as_ref().is_some_and(|o| self.stands(o)) };
         let helps = self.open.as_ref().is_some_and(|o| o.block_ratio < BETTER);
-        let Some(remaining) = remaining else { return helps };
         let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
         self.foreign || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
     }
@@ -101,11 +103,17 @@ impl Left {
         (better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
     }
 
-    /// The correction, where it models something that is left and helps where it was not fitted.
-    pub fn believed(self) -> Option<CorrectionRecord> {
+    /// Whether a correction is beyond doubt: on blocks that it was not fitted to, or by evidence that noise has nowhere. A mismatch far below the
+    /// noise never shows on blocks.
+    fn stands(&self, open: &OpenSet) -> bool {
+        open.block_ratio < BETTER || unlikely(open, ODDS_AGAINST) < self.alpha
+    }
+
+    /// The correction, where it models something that is left and helps where it was not fitted, with what it says in words.
+    pub fn believed(self) -> Option<(CorrectionRecord, Option<String>)> {
         let wanted = self.imperfect || self.test.is_none();
-        let open = self.open.filter(|o| wanted && o.block_ratio < BETTER)?;
-        Some(CorrectionRecord { ratio: finite(open.block_ratio), ..open.record })
+        let open = self.instead.as_ref().or(self.open.as_ref()).filter(|o| wanted && self.stands(o))?;
+        Some((CorrectionRecord { ratio: finite(open.block_ratio), ..open.record.clone() }, open.words.clone()))
     }
 }
 

@@ -3,6 +3,8 @@
 //! Unknown are the parameters that are not fixed (shared by all stretches), the free initial states of each stretch, and, for a stretch
 //! that begins in the middle of a recording, the initial values of all of the user's own states.
 
+mod adjoint;
+
 use std::collections::BTreeMap;
 
 use hysid_plant::{Compiled, Direction, Initial, Run, Sensitivity, Simulation, Start};

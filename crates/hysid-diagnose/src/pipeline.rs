@@ -279,7 +279,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     }
     let written = modelled.as_ref().or((named > 0).then_some(best));
     let last = modelled.as_ref().unwrap_or(best);
-    file.correction = left.believed();
+    let (correction, varying) = left.believed().unzip();
+    file.correction = correction;
+    let varying = varying.flatten();
+    file.notes.extend(varying.iter().map(|words| format!("what is left looks like something that varies: {words}")));
 
     recalibrate(&mut file);
 
@@ -291,7 +294,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
     file.notes.extend(lacking(best, &candidates));
-    file.summary = summary(&file);
+    file.summary = summary(&file, varying.as_deref());
     if let Some(note) = budget.note() {
         if unexplained {
             file.summary = "Something is missing; the search was cut short by the time limit before an effect was found that explains it.".into();

@@ -250,8 +250,8 @@ pub fn absorbing(base: &Base<'_>, simulation: &Simulation) -> Vec<String> {
     out
 }
 
-/// The verdict in a sentence or two.
-pub fn summary(file: &DiagnosisFile) -> String {
+/// The verdict in a sentence or two; `varying` says what varies, where a correction without a name says so.
+pub fn summary(file: &DiagnosisFile, varying: Option<&str>) -> String {
     let sentences = || file.effects.iter().map(|e| e.sentence.clone()).collect::<Vec<_>>().join(" ");
     let rivals = || {
         file.alternatives
@@ -273,9 +273,15 @@ pub fn summary(file: &DiagnosisFile) -> String {
         VerdictKind::Ambiguous => {
             format!("Several explanations remain: {}. The likeliest set: {}", rivals(), sentences())
         }
-        VerdictKind::NotInCatalogue => {
-            "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it.".into()
-        }
+        VerdictKind::NotInCatalogue => match varying {
+            Some(varying) => {
+                format!("Something is missing that no mechanism of the catalogue explains: it looks as if {varying}.")
+            }
+            None => {
+                "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it."
+                    .into()
+            }
+        },
     }
 }
 

@@ -31,7 +31,7 @@ pub const ODDS_AGAINST_MORE: f64 = 10.0;
 const MOMENTS: f64 = 25.0;
 /// Log evidence that a set of nothing but drifts must bring besides: noise that rises towards low frequency does what they do,
 /// process noise on a drive above all.
-const SLOW: f64 = 8.0;
+pub const SLOW: f64 = 8.0;
 
 /// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
 pub fn unlikely(open: &OpenSet, odds_against: f64) -> f64 {

@@ -185,6 +185,20 @@ impl DataSet {
         all.keep(|_, n, len| (n as f64) < share * len as f64)
     }
 
+    /// The same data with so many further inputs, zero throughout.
+    pub fn with_still_inputs(&self, count: usize) -> Self {
+        let mut out = self.clone();
+        for s in &mut out.stretches {
+            let mut inputs = s.drive.inputs().to_vec();
+            inputs.resize(inputs.len() + count, vec![0.0; s.len()]);
+            // A good drive with zeros beside it is a good drive.
+            if let Ok(drive) = Drive::new(s.drive.start_s(), s.drive.period_s(), s.len(), inputs) {
+                s.drive = drive;
+            }
+        }
+        out
+    }
+
     /// The same inputs with other measured outputs (in the order of the rows).
     pub fn with_outputs(&self, y: Vec<f64>) -> Self {
         let mut out = self.clone();

@@ -10,6 +10,7 @@
 //! Reference: efficient score tests (Neyman C(alpha)); circular-shift surrogates for dependent data.
 
 mod ar;
+mod constancy;
 mod driven;
 mod layout;
 mod noise;
@@ -20,6 +21,7 @@ mod shape;
 mod surrogate;
 
 pub use ar::{AR_ORDERS, ArModel, fit_ar};
+pub use constancy::{Wander, lines};
 pub use layout::{Layout, Series, Whitener};
 pub use noise::NoiseModel;
 pub use projector::{Projector, dot, norm2};

@@ -9,8 +9,11 @@
 //! Reference: P. Martins and L. A. Aguirre, Sufficient conditions for rate-independent hysteresis in autoregressive identified models,
 //! MSSP 75 (2016): memory without rate needs an operator with memory, which no static term imitates.
 
+mod course;
+mod modulation;
 mod signature;
 mod terms;
+mod varying;
 mod written;
 
 use hysid_linalg::Matrix;
@@ -20,10 +23,11 @@ use hysid_select::{Criterion, Options as Selecting, select};
 use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use crate::data::held_out_blocks;
 use crate::evidence::{Projector, Whitener, dot, norm2};
-use crate::file::{CorrectionRecord, TermRecord};
+use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use signature::signature;
 use terms::{Kind, Term, terms};
-use written::with_terms;
+use varying::{Varying, varying};
+use written::{with_oscillation, with_terms};
 
 /// A correction with what decides whether it is believed.
 #[derive(Debug, Clone)]
@@ -34,9 +38,11 @@ pub struct OpenSet {
     pub block_ratio: f64,
     /// Log evidence that it adds: its terms pay for their coefficients, and for having been chosen out of many.
     pub gain: f64,
-    /// The fitted simulation with the terms in it, not yet refitted; `None` where a term cannot be written, or is a function of the time
+    /// The fitted simulation with the terms in it, not yet refitted; `None` where a term cannot be written, where a parameter walks, or where a term is a function of the time
     /// in this recording beside others that are not: such a term mends what the others miss, and says nothing of another recording.
     pub written: Option<Simulation>,
+    /// What it says in words, where it says more than that something is missing.
+    pub words: Option<String>,
 }
 
 /// Most terms of a correction.
@@ -55,28 +61,41 @@ struct Chosen {
     gain: f64,
 }
 
-/// The sparse correction of what is left of a fitted simulation's residual; `None` where no term is chosen.
+/// The correction of what is left of a fitted simulation's residual: sparse terms or a parameter that varies, whichever has more evidence; `None`
+/// where there is neither.
 pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
-    let data = base.model.data();
-    let terms = terms(base);
+    let layout = &base.model.data().layout;
     let mut noises = vec![base.whitener.clone()];
     if kind == NoiseKind::Coloured && base.coloured() {
-        noises.push(data.layout.fit_noise(&base.fit.residual, 0, &[]));
+        noises.push(layout.fit_noise(&base.fit.residual, 0, &[]));
     }
-    let best =
-        noises.iter().filter_map(|noise| choose(base, kind, &terms, noise)).max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    let terms = terms(base);
+    let sparse =
+        noises.iter().filter_map(|noise| choose(base, kind, &terms, noise)).max_by(|a, b| a.gain.total_cmp(&b.gain));
+    match (sparse, varying(base, kind, &noises)) {
+        (Some(sparse), Some(varying)) if varying.gain > sparse.gain => Some(of_varying(base, varying)),
+        (None, Some(varying)) => Some(of_varying(base, varying)),
+        (Some(sparse), _) => Some(of_terms(base, &terms, sparse)),
+        (None, None) => None,
+    }
+}
 
-    // Judged on blocks: coefficients from the others.
+/// Rms error on blocks that the coefficients of these columns were not fitted to, over that without them, whitened by the noise that they leave.
+fn block_ratio(base: &Base<'_>, columns: &[&[f64]], left: &Whitener, precision: f64) -> f64 {
+    let data = base.model.data();
     let weights = held_out_blocks(&data.layout, &data.y);
-    let columns: Vec<&[f64]> = best.terms.iter().map(|&i| terms[i].column.as_slice()).collect();
     let on_blocks = |columns: &[&[f64]]| -> f64 {
-        let (_, after) = regress(base, columns, &best.left, Some(&weights));
-        let white = best.left.apply(&data.layout, &after);
+        let (_, after) = regress(base, columns, left, Some(&weights), precision);
+        let white = left.apply(&data.layout, &after);
         white.iter().zip(&weights).filter(|(_, w)| **w == 0.0).map(|(e, _)| e * e).sum()
     };
-    let (before, after) = (on_blocks(&[]), on_blocks(&columns));
-    let block_ratio = if before > 0.0 { (after / before).sqrt() } else { 1.0 };
+    let (before, after) = (on_blocks(&[]), on_blocks(columns));
+    if before > 0.0 { (after / before).sqrt() } else { 1.0 }
+}
 
+/// A correction by sparse terms.
+fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
+    let columns: Vec<&[f64]> = best.terms.iter().map(|&i| terms[i].column.as_slice()).collect();
     let records = best
         .terms
         .iter()
@@ -85,17 +104,44 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
         .map(|((&i, c), err)| TermRecord { term: terms[i].text.clone(), coefficient: *c, err: *err })
         .collect();
     let slot = terms[best.terms[0]].slot.clone();
-    let signature = signature(base, &terms, &best.left, &best.terms, &best.coefficients);
+    let signature = signature(base, terms, &best.left, &best.terms, &best.coefficients);
     let timed = best.terms.iter().filter(|&&i| terms[i].kind == Kind::Time).count();
     let with_coefficients = best.terms.iter().map(|&i| &terms[i]).zip(best.coefficients.iter().copied());
     let written =
         if timed == 0 || timed == best.terms.len() { with_terms(&base.document(), with_coefficients) } else { None };
-    Some(OpenSet {
+    OpenSet {
         record: CorrectionRecord { slot, terms: records, signature, ratio: None },
-        block_ratio,
+        block_ratio: block_ratio(base, &columns, &best.left, 0.0),
         gain: best.gain,
         written,
-    })
+        words: None,
+    }
+}
+
+/// A correction by a parameter that varies.
+fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
+    let columns: Vec<&[f64]> = found.columns.iter().map(Vec::as_slice).collect();
+    let mut order: Vec<usize> = (0..found.texts.len()).collect();
+    order.sort_by(|&a, &b| found.err[b].total_cmp(&found.err[a]));
+    let records = order
+        .iter()
+        .take(MOST_TERMS)
+        .map(|&i| TermRecord {
+            term: format!("{}*{}", found.symbol, found.texts[i]),
+            coefficient: found.amplitudes[i],
+            err: found.err[i],
+        })
+        .collect();
+    let place = if found.input { "input" } else { "parameter" };
+    let signature =
+        SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "odd".into(), side: "time".into() };
+    OpenSet {
+        record: CorrectionRecord { slot: format!("{place}:{}", found.symbol), terms: records, signature, ratio: None },
+        block_ratio: block_ratio(base, &columns, &found.left, found.precision),
+        gain: found.gain,
+        written: with_oscillation(&base.document(), &found),
+        words: Some(found.words()),
+    }
 }
 
 /// The terms that explain the residual under a noise model; `None` where there are none.
@@ -124,10 +170,10 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
     let picked: Vec<&[f64]> = chosen.iter().map(|&i| terms[i].column.as_slice()).collect();
     let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
     let mut left = noise.clone();
-    let (mut coefficients, mut after) = regress(base, &picked, &left, None);
+    let (mut coefficients, mut after) = regress(base, &picked, &left, None, 0.0);
     for _ in 0..2 {
         left = layout.fit_noise(&after, order, &base.paths);
-        (coefficients, after) = regress(base, &picked, &left, None);
+        (coefficients, after) = regress(base, &picked, &left, None, 0.0);
     }
     let data = base.model.data();
     let likelihood =
@@ -142,8 +188,14 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
 }
 
 /// Least squares of the residual on these columns beside the simulation's own tangents, with these weights of the whitened rows: the columns'
-/// coefficients, and what is left.
-fn regress(base: &Base<'_>, columns: &[&[f64]], noise: &Whitener, weights: Option<&[f64]>) -> (Vec<f64>, Vec<f64>) {
+/// coefficients, and what is left. Columns' coefficients have this precision beforehand, in units of the whitened rows.
+fn regress(
+    base: &Base<'_>,
+    columns: &[&[f64]],
+    noise: &Whitener,
+    weights: Option<&[f64]>,
+    precision: f64,
+) -> (Vec<f64>, Vec<f64>) {
     let layout = &base.model.data().layout;
     let own = base.fit.jacobian.len();
     let all: Vec<&[f64]> = base.fit.jacobian.iter().map(Vec::as_slice).chain(columns.iter().copied()).collect();
@@ -158,8 +210,9 @@ fn regress(base: &Base<'_>, columns: &[&[f64]], noise: &Whitener, weights: Optio
     let r = weigh(noise.apply(layout, &base.fit.residual));
     let k = all.len();
     // A little ridge, for tangents that are combinations of others.
+    let known = |a: usize| if a < own { 0.0 } else { precision / (norms[a] * norms[a]) };
     let gram = nalgebra::DMatrix::from_fn(k, k, |a, b| {
-        dot(&white[a], &white[b]) / (norms[a] * norms[b]) + if a == b { 1e-9 } else { 0.0 }
+        dot(&white[a], &white[b]) / (norms[a] * norms[b]) + if a == b { 1e-9 + known(a) } else { 0.0 }
     });
     let rhs = nalgebra::DVector::from_fn(k, |a, _| dot(&white[a], &r) / norms[a]);
     let solution: Vec<f64> = match gram.cholesky() {

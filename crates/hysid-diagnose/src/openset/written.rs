@@ -3,9 +3,14 @@
 //! Regression on the tangent chose the terms out of a coarse grid. A wave number that is a tenth wrong is out of phase at the end of the range,
 //! and what was better on the recording is then worse on another: all of it is refitted.
 
+use std::f64::consts::TAU;
+
 use hysid_plant::{Expr, Parameter, Simulation, Slot as Place};
 
+use super::course::Course;
+use super::modulation::multiply;
 use super::terms::Term;
+use super::varying::Varying;
 
 /// How far a coefficient may move from where the regression on the tangent found it, over its own size.
 const REACH: f64 = 10.0;
@@ -44,6 +49,31 @@ pub fn with_terms<'t>(simulation: &Simulation, terms: impl IntoIterator<Item = (
             written.map_equations(|e| e.substitute(&input.symbol, &sum));
         }
     }
+    Some(written)
+}
+
+/// Share of a cycle over the recording by which a frequency may move from where the periodogram found it.
+const CYCLES: f64 = 0.75;
+
+/// A simulation in which a parameter oscillates, amplitudes and frequency unknown; `None` for a walk, since another recording sees another one.
+pub fn with_oscillation(simulation: &Simulation, found: &Varying) -> Option<Simulation> {
+    let Course::Line(f) = found.course else { return None };
+    let mut written = simulation.clone();
+    let frequency = written.fresh_symbol("s");
+    let (w, far) = (TAU * f, TAU * CYCLES / found.length_s);
+    written.parameters.push(Parameter::new(&frequency, w).within(w - far, w + far));
+    let mut factor = Expr::Number(1.0);
+    for (text, amplitude) in found.texts.iter().zip(&found.amplitudes) {
+        let course = Expr::parse(text).ok()?.map(&mut |e| match e {
+            Expr::Number(_) => Expr::symbol(&frequency),
+            other => other,
+        });
+        let name = written.fresh_symbol("g");
+        let reach = REACH * found.size;
+        written.parameters.push(Parameter::new(&name, *amplitude).within(-reach, reach));
+        factor = factor + Expr::symbol(&name) * course;
+    }
+    multiply(&mut written, &found.symbol, &factor);
     Some(written)
 }
 

@@ -1,0 +1,90 @@
+//! A simulation whose parameters and input gains can be modulated: each is multiplied by one and a further input that is zero.
+//!
+//! The response to a signal at such an input is the derivative by the modulation's amplitude, exactly, wherever the parameter stands; the adjoint
+//! gives the score of a modulation at every instant.
+
+use hysid_plant::{Expr, Input, Simulation, Slot as Place};
+use rayon::prelude::*;
+
+use crate::base::Base;
+use crate::data::DataSet;
+use crate::evidence::Whitener;
+use crate::model::Model;
+
+/// Signals that are pushed through the simulation's tangent together.
+const TOGETHER: usize = 8;
+/// Most parameters and inputs that are looked at.
+const MOST: usize = 12;
+
+/// What can be modulated: a parameter or an input, by its symbol.
+pub fn modulated(base: &Base<'_>) -> Vec<String> {
+    let simulation = base.model.simulation();
+    let values = base.values();
+    let own = base.model.unknowns().len();
+    let inputs = simulation.inputs.iter().filter(|_| !simulation.is_static()).map(|u| u.symbol.clone());
+    (0..own)
+        .filter_map(|place| base.model.name_of(place))
+        .filter(|name| values.parameters.get(*name).is_some_and(|v| *v != 0.0))
+        .map(str::to_owned)
+        .chain(inputs)
+        .take(MOST)
+        .collect()
+}
+
+/// Multiplies a symbol in every equation.
+pub fn multiply(simulation: &mut Simulation, symbol: &str, factor: &Expr) {
+    let by = Expr::symbol(symbol) * factor.clone();
+    simulation.map_equations(|e| e.substitute(symbol, &by));
+}
+
+/// The fitted simulation with a further input for each modulation.
+pub struct Modulated<'d> {
+    model: Model<'d>,
+    theta: Vec<f64>,
+    /// Inputs that the simulation itself has.
+    own: usize,
+}
+
+impl<'d> Modulated<'d> {
+    /// With a modulation of each of these symbols; `data` are the fit's with as many still inputs.
+    pub fn new(base: &Base<'_>, symbols: &[String], data: &'d DataSet) -> Option<Self> {
+        let mut document = base.document();
+        let own = document.inputs.len();
+        for symbol in symbols {
+            let name = document.fresh_symbol("modulation");
+            document.inputs.push(Input { symbol: name.clone(), column: name.clone() });
+            multiply(&mut document, symbol, &(Expr::Number(1.0) + Expr::symbol(&name)));
+        }
+        let states: Vec<String> = document.states.iter().map(|s| s.name.clone()).collect();
+        let model = Model::new(&document, data, &states, base.model.substeps()).ok()?;
+        let theta = model.theta(&base.values());
+        Some(Self { model, theta, own })
+    }
+
+    /// The stacked response to each modulation (number of the symbol, series by stretch), for an amplitude of one.
+    pub fn responses(&self, modulations: &[(usize, Vec<Vec<f64>>)]) -> Vec<Option<Vec<f64>>> {
+        modulations
+            .par_chunks(TOGETHER)
+            .flat_map_iter(|some| {
+                let signals: Vec<_> =
+                    some.iter().map(|(i, series)| (Place::Input(self.own + i), series.as_slice())).collect();
+                self.model.responses_to(&self.theta, &signals)
+            })
+            .collect()
+    }
+
+    /// The score of a modulation at each instant, for each of several whitened residuals: `[residual][symbol][stretch][sample]`.
+    pub fn scores(&self, noise: &Whitener, residuals: &[Vec<f64>]) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
+        let layout = &self.model.data().layout;
+        // A filter that does not change with time is transposed by running it backwards; only the start, where it is not settled, differs.
+        let reversed = |x: &[f64]| {
+            let mut out = x.to_vec();
+            layout.series.iter().for_each(|s| out[s.rows.clone()].reverse());
+            out
+        };
+        let weights: Vec<Vec<f64>> = residuals.iter().map(|r| reversed(&noise.apply(layout, &reversed(r)))).collect();
+        let mut all = self.model.by_inputs(&self.theta, &weights)?;
+        all.iter_mut().for_each(|by| *by = by.split_off(self.own.min(by.len())));
+        Some(all)
+    }
+}

@@ -1,0 +1,366 @@
+//! Parameters that are not constant: a parameter or an input gain that wanders, or that oscillates at a frequency of its own.
+//!
+//! No feature of the catalogue need resemble what such a parameter does, and a noise model that was fitted to the residual takes it for noise. So each
+//! modulation is judged by its evidence with a noise model of its own, under the noise of the fit and, where that is coloured, from white
+//! noise. A walk pays for what the recording settles of it ([`Wander`]); an oscillation pays for two amplitudes, and for the lines and parameters among
+//! which it was found.
+
+use std::f64::consts::SQRT_2;
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::course::{COURSES, Course, Series, Time};
+use super::modulation::{Modulated, modulated};
+use super::regress;
+use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
+use crate::evidence::{Layout, Projector, Wander, Whitener, dot, lines, norm2, score};
+use crate::random::generator;
+use crate::second_look::SLOW;
+use crate::text::number;
+
+/// Lines of each parameter whose responses are taken, and of these how many are judged with a noise model of their own.
+const LINES: (usize, usize) = (4, 2);
+/// Scores of noise against which those of the residual are held, and the stream that it is drawn from.
+const NOISES: usize = 7;
+const STREAM: u64 = 0x7 << 56;
+/// Walks that are judged with a noise model of their own.
+const WALKS: usize = 2;
+/// Rounds of amplitudes and noise by turns.
+const ROUNDS: usize = 3;
+
+/// A parameter that varies.
+pub struct Varying {
+    /// Its symbol, or that of an input whose gain varies.
+    pub symbol: String,
+    /// Whether it is an input.
+    pub input: bool,
+    /// How it varies.
+    pub course: Course,
+    /// The courses over time, as factors of the parameter's own value, for an amplitude of one.
+    pub texts: Vec<String>,
+    /// Their responses.
+    pub columns: Vec<Vec<f64>>,
+    /// Their amplitudes.
+    pub amplitudes: Vec<f64>,
+    /// What the amplitudes' scale weighs in a regression of whitened rows.
+    pub precision: f64,
+    /// Share of the residual's power that each explains.
+    pub err: Vec<f64>,
+    /// Standard deviation of the modulation over the recording.
+    pub size: f64,
+    /// Length of the recording, in seconds.
+    pub length_s: f64,
+    /// The noise of what is left.
+    pub left: Whitener,
+    /// Log evidence that it adds.
+    pub gain: f64,
+}
+
+impl Varying {
+    /// In words.
+    pub fn words(&self) -> String {
+        let what = if self.input { "the gain of the input" } else { "the parameter" };
+        let how = match self.course {
+            Course::Walk(_) => {
+                format!("wanders slowly in time, by {} % of its value (rms)", number(100.0 * self.size))
+            }
+            Course::Line(f) => format!(
+                "oscillates in time at {} Hz, by {} % of its value",
+                number(f),
+                number(100.0 * SQRT_2 * self.size)
+            ),
+        };
+        format!("{what} `{}` {how}", self.symbol)
+    }
+}
+
+/// A modulation before it is judged with a noise model of its own.
+struct Candidate {
+    symbol: usize,
+    course: Course,
+    columns: Vec<Vec<f64>>,
+    gain: f64,
+}
+
+/// The residual under a noise, off what is estimated besides.
+struct View<'a> {
+    noise: &'a Whitener,
+    layout: &'a Layout,
+    own: Projector,
+    r: Vec<f64>,
+}
+
+impl<'a> View<'a> {
+    fn new(base: &'a Base<'_>, noise: &'a Whitener) -> Self {
+        let layout = &base.model.data().layout;
+        let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
+        let mut r = noise.apply(layout, &base.fit.residual);
+        own.remove(&mut r);
+        Self { noise, layout, own, r }
+    }
+
+    fn of(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let white = |x: &Vec<f64>| {
+            let mut w = self.noise.apply(self.layout, x);
+            self.own.remove(&mut w);
+            w
+        };
+        columns.iter().map(white).collect()
+    }
+
+    /// Log likelihood that free amplitudes of a few columns gain.
+    fn free_gain(&self, columns: &[Vec<f64>]) -> f64 {
+        0.5 * score(norm2(&self.r), Projector::new(self.of(columns)).inside(&self.r), self.r.len(), 0)
+    }
+
+    /// Log likelihood of the residual without the price of the noise's coefficients, and whatever is estimated besides at its best.
+    fn log_likelihood(&self, base: &Base<'_>) -> f64 {
+        let data = base.model.data();
+        let plain = self.noise.apply(self.layout, &base.fit.residual);
+        let fitted = 0.5 * (norm2(&plain) - norm2(&self.r));
+        log_likelihood(data, self.noise, &base.fit.residual) + fitted + spared(data, self.noise)
+    }
+}
+
+/// The parameter that varies most likely, judged with a noise model of its own; `None` where nothing can be modulated.
+pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<Varying> {
+    let symbols = modulated(base);
+    let time = Time::of(base)?;
+    let data = base.model.data().with_still_inputs(symbols.len());
+    let machine = Modulated::new(base, &symbols, &data).filter(|_| !symbols.is_empty())?;
+    let courses = time.courses(Course::Walk(1.0));
+    let requests: Vec<(usize, Series)> =
+        (0..symbols.len()).flat_map(|i| courses.iter().map(move |w| (i, w.clone()))).collect();
+    let of_walks: Vec<Option<Vec<Vec<f64>>>> =
+        machine.responses(&requests).chunks(COURSES).map(|some| some.iter().cloned().collect()).collect();
+    let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
+    let mut best: Option<Varying> = None;
+    for noise in noises {
+        let view = View::new(base, noise);
+        let mut found = likely_walks(&view, kind, &of_walks);
+        found.extend(likely_lines(base, &view, &machine, &time, symbols.len()));
+        for candidate in found {
+            let Some(v) = judged(base, kind, noise, &symbols, &time, candidate, none) else { continue };
+            if best.as_ref().is_none_or(|b| v.gain > b.gain) {
+                best = Some(v);
+            }
+        }
+    }
+    best
+}
+
+/// The parameters whose walk explains most under this noise.
+fn likely_walks(view: &View<'_>, kind: NoiseKind, of_walks: &[Option<Vec<Vec<f64>>>]) -> Vec<Candidate> {
+    let variance = norm2(&view.r) / view.r.len().max(1) as f64;
+    let weight = kind.share() / variance.max(f64::MIN_POSITIVE);
+    let one = |(symbol, columns): (usize, &Option<Vec<Vec<f64>>>)| {
+        let columns = columns.as_ref()?;
+        let (gain, scale) = Wander::new(&view.of(columns), &view.r, weight).mean_gain();
+        Some(Candidate { symbol, course: Course::Walk(scale), columns: columns.clone(), gain })
+    };
+    let mut found: Vec<Candidate> = of_walks.iter().enumerate().filter_map(one).collect();
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found.truncate(WALKS);
+    found
+}
+
+/// The lines of the parameters' scores that explain most under this noise.
+fn likely_lines(
+    base: &Base<'_>,
+    view: &View<'_>,
+    machine: &Modulated<'_>,
+    time: &Time,
+    symbols: usize,
+) -> Vec<Candidate> {
+    let period_s = base.model.data().period_s;
+    let mut rng = generator(0, STREAM);
+    let white = (0..NOISES).map(|_| (0..view.r.len()).map(|_| StandardNormal.sample(&mut rng)).collect::<Vec<f64>>());
+    let all: Vec<Vec<f64>> = std::iter::once(view.r.clone()).chain(white).collect();
+    let Some(scores) = machine.scores(view.noise, &all) else { return Vec::new() };
+    let mut wanted: Vec<(usize, Course)> = Vec::new();
+    for symbol in 0..symbols {
+        let series: Option<Series> = scores.iter().map(|s| time.together(s.get(symbol)?, period_s)).collect();
+        let Some((score, noises)) = series.as_ref().and_then(|s| s.split_first()) else { continue };
+        wanted.extend(lines(score, noises, LINES.0).iter().map(|l| (symbol, Course::Line(l.cycles / period_s))));
+    }
+    let requests: Vec<(usize, Series)> =
+        wanted.iter().flat_map(|&(symbol, line)| time.courses(line).into_iter().map(move |c| (symbol, c))).collect();
+    let responses = machine.responses(&requests);
+    let mut found: Vec<Candidate> = wanted
+        .iter()
+        .zip(responses.chunks(2))
+        .filter_map(|(&(symbol, course), pair)| {
+            let columns: Vec<Vec<f64>> = pair.iter().cloned().collect::<Option<_>>()?;
+            Some(Candidate { symbol, course, gain: view.free_gain(&columns), columns })
+        })
+        .collect();
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found.truncate(LINES.1);
+    found
+}
+
+/// A candidate with a noise model of its own, beside the log likelihood of `none`.
+fn judged(
+    base: &Base<'_>,
+    kind: NoiseKind,
+    noise: &Whitener,
+    symbols: &[String],
+    time: &Time,
+    candidate: Candidate,
+    none: f64,
+) -> Option<Varying> {
+    let Candidate { symbol, mut course, columns, .. } = candidate;
+    let data = base.model.data();
+    let layout = &data.layout;
+    let share = kind.share();
+    let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
+    let picked: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let mut left = noise.clone();
+    if matches!(course, Course::Walk(_)) && left.order() == 0 {
+        // White noise of the size of the whole residual would leave little for the walk to explain.
+        let (_, after) = regress(base, &picked, &left, None, 0.0);
+        left = layout.fit_noise(&after, 0, &[]);
+    }
+    for _ in 0..ROUNDS {
+        if let Course::Walk(scale) = &mut course {
+            let view = View::new(base, &left);
+            *scale = Wander::new(&view.of(&columns), &view.r, share).mean_gain().1;
+        }
+        let (_, after) = regress(base, &picked, &left, None, course.precision(share));
+        left = layout.fit_noise(&after, order, &base.paths);
+    }
+    let (amplitudes, after) = regress(base, &picked, &left, None, course.precision(share));
+    let view = View::new(base, &left);
+    let white = view.of(&columns);
+    let among = (symbols.len() as f64).ln();
+    let (likelihood, price) = match course {
+        Course::Walk(_) => {
+            (share * view.log_likelihood(base) + Wander::new(&white, &view.r, share).mean_gain().0, among + SLOW)
+        }
+        Course::Line(_) => {
+            let each = 0.5 * (share * data.rows() as f64).max(2.0).ln();
+            let lines = time.samples().max(2) as f64;
+            (share * (log_likelihood(data, &left, &after) + spared(data, &left)), 2.0 * each + lines.ln() + among)
+        }
+    };
+    let total = norm2(&view.r).max(f64::MIN_POSITIVE);
+    let err = white.iter().zip(&amplitudes).map(|(c, a)| a * dot(c, &view.r) / total).collect();
+    let symbol = symbols.get(symbol)?.clone();
+    let input = base.model.simulation().inputs.iter().any(|u| u.symbol == symbol);
+    Some(Varying {
+        symbol,
+        input,
+        course,
+        texts: time.texts(course),
+        size: time.deviation(course, &amplitudes),
+        columns,
+        amplitudes,
+        precision: course.precision(share),
+        err,
+        length_s: time.length,
+        gain: likelihood - none - price,
+        left,
+    })
+}
+
+#[cfg(test)]
+#[path = "../../tests/common/oscillator.rs"]
+mod oscillator;
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::f64::consts::TAU;
+
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
+    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use super::*;
+    use crate::base::{Start, fit_simulation};
+    use crate::data::DataSet;
+    use crate::model::{Model, Values};
+    use crate::openset::written::with_oscillation;
+    use crate::refit::LmOptions;
+
+    /// An oscillator whose stiffness is multiplied by a function of the time, with white noise of this share of the output.
+    fn recorded(seed: u64, factor: impl Fn(f64) -> f64, noise: f64) -> DataSet {
+        let mut random = normal(seed);
+        let u = drive(1200, &mut random);
+        let (steps, (.., k)) = (Cell::new(0u32), REAL);
+        let force = |x: f64, _: f64| {
+            let t = f64::from(steps.replace(steps.get() + 1)) * PERIOD / 40.0;
+            k * (factor(t) - 1.0) * x
+        };
+        let mut y = respond(&u, REAL, force);
+        let size = noise * rms(&y);
+        y.iter_mut().for_each(|y| *y += size * random());
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        DataSet::new(&Simulation::parse(BASELINE, "test.sim.toml").unwrap(), &[recording], 3).unwrap()
+    }
+
+    fn model<'d>(simulation: &Simulation, data: &'d DataSet) -> Model<'d> {
+        Model::new(simulation, data, &["x".into(), "v".into()], 2).unwrap()
+    }
+
+    fn fitted(data: &DataSet) -> Base<'_> {
+        let simulation = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let start = Values::default();
+        let options = LmOptions { iterations: 25, ..LmOptions::default() };
+        let model = model(&simulation, data);
+        fit_simulation(model, Start::Values(&start), &[], None, 2, options, NoiseKind::Coloured).unwrap()
+    }
+
+    fn found(data: &DataSet) -> Varying {
+        let base = fitted(data);
+        let plain = data.layout.fit_noise(&base.fit.residual, 0, &[]);
+        varying(&base, NoiseKind::Coloured, &[base.whitener.clone(), plain]).unwrap()
+    }
+
+    #[test]
+    fn a_stiffness_that_oscillates_is_found_with_its_frequency_and_size() {
+        let v = found(&recorded(3, |t| 1.0 + 0.02 * (TAU * 0.73 * t + 0.4).sin(), 0.02));
+        let Course::Line(f) = v.course else { panic!("{}", v.words()) };
+        assert!(v.symbol == "k" && (f - 0.73).abs() < 0.01 && v.gain > 30.0, "{} {}", v.words(), v.gain);
+        assert!((SQRT_2 * v.size - 0.02).abs() < 0.005, "{}", v.words());
+    }
+
+    #[test]
+    fn a_stiffness_that_wanders_is_found() {
+        let v = found(&recorded(4, |t| 1.0 + 0.02 * ((0.31 * t).sin() + (0.17 * t).cos() * (0.53 * t).sin()), 0.02));
+        assert!(v.symbol == "k" && matches!(v.course, Course::Walk(_)) && v.gain > 30.0, "{} {}", v.words(), v.gain);
+    }
+
+    #[test]
+    fn a_constant_stiffness_is_left_alone() {
+        for seed in 10..16 {
+            let v = found(&recorded(seed, |_| 1.0, 0.02));
+            assert!(v.gain < 3.0, "{seed}: {} {}", v.words(), v.gain);
+        }
+    }
+
+    #[test]
+    fn the_response_of_a_course_is_the_derivative_of_what_is_written() {
+        let data = recorded(3, |t| 1.0 + 0.02 * (TAU * 0.73 * t).sin(), 0.02);
+        let v = found(&data);
+        let base = fitted(&data);
+        let written = with_oscillation(&base.document(), &v).unwrap();
+        let names: Vec<String> =
+            written.parameters.iter().map(|p| p.name.clone()).filter(|n| n.starts_with('g')).collect();
+        assert_eq!(names.len(), 2);
+        for (name, column) in names.iter().zip(&v.columns) {
+            let response = |g: f64| {
+                let mut one = written.clone();
+                names.iter().for_each(|n| one.parameter_mut(n).unwrap().value = 0.0);
+                one.parameter_mut(name).unwrap().value = g;
+                let m = model(&one, &data);
+                m.predict(&m.theta(&Values::default())).unwrap()
+            };
+            let g = 1e-4;
+            let slope: Vec<f64> = response(g).iter().zip(response(-g)).map(|(a, b)| (a - b) / (2.0 * g)).collect();
+            let cosine = dot(&slope, column) / (norm2(&slope) * norm2(column)).sqrt();
+            assert!(cosine > 0.999 && (rms(&slope) / rms(column) - 1.0).abs() < 0.01, "{name}: {cosine}");
+        }
+    }
+}
