@@ -16,6 +16,10 @@ const TOGETHER: usize = 8;
 /// Most parameters and inputs that are looked at.
 const MOST: usize = 12;
 
+/// Instants at which it is looked at whether a modulation acts on something that moves, and the change that is none.
+const INSTANTS: usize = 24;
+const CONSTANT: f64 = 1e-6;
+
 /// What can be modulated: a parameter or an input, by its symbol.
 pub fn modulated(base: &Base<'_>) -> Vec<String> {
     let simulation = base.model.simulation();
@@ -59,6 +63,23 @@ impl<'d> Modulated<'d> {
         let model = Model::new(&document, data, &states, base.model.substeps()).ok()?;
         let theta = model.theta(&base.values());
         Some(Self { model, theta, own })
+    }
+
+    /// Whether each modulation acts on something that moves. An offset that varies is an unknown force or a drift of the sensor, which noise is too.
+    pub fn of_motion(&self) -> Vec<bool> {
+        let points = self.model.linearised(&self.theta, INSTANTS);
+        let inputs = self.model.simulation().inputs.len();
+        let column = |p: &hysid_plant::Linearisation, i: usize| -> Vec<f64> {
+            p.b.chunks(inputs).chain(p.d.chunks(inputs)).filter_map(|row| row.get(i).copied()).collect()
+        };
+        (self.own..inputs)
+            .map(|i| {
+                let all: Vec<Vec<f64>> = points.iter().map(|p| column(p, i)).collect();
+                let size = all.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
+                let moved = |x: &Vec<f64>| x.iter().zip(&all[0]).any(|(a, b)| (a - b).abs() > CONSTANT * size);
+                all.iter().any(moved)
+            })
+            .collect()
     }
 
     /// The stacked response to each modulation (number of the symbol, series by stretch), for an amplitude of one.

@@ -124,8 +124,11 @@ impl<'a> View<'a> {
 
 /// The parameter that varies most likely, judged with a noise model of its own; `None` where nothing can be modulated.
 pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<Varying> {
-    let symbols = modulated(base);
+    let all = modulated(base);
     let time = Time::of(base)?;
+    let data = base.model.data().with_still_inputs(all.len());
+    let moving = Modulated::new(base, &all, &data)?.of_motion();
+    let symbols: Vec<String> = all.into_iter().zip(moving).filter(|(_, moving)| *moving).map(|(s, _)| s).collect();
     let data = base.model.data().with_still_inputs(symbols.len());
     let machine = Modulated::new(base, &symbols, &data).filter(|_| !symbols.is_empty())?;
     let courses = time.courses(Course::Walk(1.0));
@@ -338,6 +341,28 @@ mod tests {
             let v = found(&recorded(seed, |_| 1.0, 0.02));
             assert!(v.gain < 3.0, "{seed}: {} {}", v.words(), v.gain);
         }
+    }
+
+    #[test]
+    fn an_offset_that_wanders_is_no_parameter_that_does() {
+        let offset = BASELINE
+            .replace("(u - c*v - k*x)/m", "(u - c*v - k*x + F0)/m")
+            .replace("[states]", "F0 = { value = 0.5 }\n[states]");
+        let data = recorded(5, |_| 1.0, 0.02);
+        let base = fit_simulation(
+            model(&Simulation::parse(&offset, "test.sim.toml").unwrap(), &data),
+            Start::Values(&Values::default()),
+            &[],
+            None,
+            1,
+            LmOptions::default(),
+            NoiseKind::White(1.0),
+        )
+        .unwrap();
+        let all = modulated(&base);
+        assert_eq!(all, ["m", "c", "k", "F0", "u"]);
+        let data = data.with_still_inputs(all.len());
+        assert_eq!(Modulated::new(&base, &all, &data).unwrap().of_motion(), [true, true, true, false, true]);
     }
 
     #[test]
