@@ -347,7 +347,7 @@ mod tests {
     fn an_offset_that_wanders_is_no_parameter_that_does() {
         let offset = BASELINE
             .replace("(u - c*v - k*x)/m", "(u - c*v - k*x + F0)/m")
-            .replace("[states]", "F0 = { value = 0.5 }\n[states]");
+            .replace("[states]", "F0 = { value = 0.5, min = -5.0, max = 5.0, unit = \"N\" }\n[states]");
         let data = recorded(5, |_| 1.0, 0.02);
         let base = fit_simulation(
             model(&Simulation::parse(&offset, "test.sim.toml").unwrap(), &data),
