@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::budget::Step;
+use crate::finer::finer;
 use crate::fitting::{HOPELESS, Part, assemble, complete, refit_all, without};
 use crate::hypothesis::{Effect, Hypothesis, Key, Setting};
 use crate::joint::pairs;
@@ -120,7 +121,7 @@ pub fn superposed<'d>(
             }
             let parts =
                 [0, 1].map(|i| Part::of_candidate(&candidates[pair.members[i]], pair.points[i], &pair.amplitudes[i]));
-            assemble(setting, none, &own, &parts, 5)
+            assemble(setting, none, &own, &parts, &none.base.whitener, 5)
         })
         .collect();
     sketched.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -168,6 +169,7 @@ pub fn compose<'d>(
         for h in found {
             add(pool, h);
         }
+        let reached = reached.max(recast(setting, none, pool, depth));
         if reached < best + LEAST_GAIN {
             break;
         }
@@ -179,7 +181,7 @@ pub fn compose<'d>(
         if n < 2 || enough() {
             return;
         }
-        let before = pool[best].key();
+        let (before, evidence) = (pool[best].key(), pool[best].log_evidence);
         let mut found = Vec::new();
         for index in 0..n {
             if enough() {
@@ -192,10 +194,27 @@ pub fn compose<'d>(
         for h in found {
             add(pool, h);
         }
+        if best_of_size(pool, n).is_some_and(|b| pool[b].log_evidence > evidence) {
+            recast(setting, none, pool, n);
+        }
         if best_of(pool).is_none_or(|b| pool[b].key() == before) {
             break;
         }
     }
+}
+
+/// Adds the best set of so many effects with the law of each member in the form that has the most evidence beside the others: a member that
+/// was written before another was known may show more, or have less to show, beside it. Returns the evidence of what was added.
+fn recast<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, pool: &mut Vec<Hypothesis<'d>>, effects: usize) -> f64 {
+    let mut reached = f64::NEG_INFINITY;
+    for index in 0..effects {
+        let Some(best) = best_of_size(pool, effects) else { break };
+        if let Some(other) = finer(setting, none, &pool[best], index) {
+            reached = other.log_evidence;
+            add(pool, other);
+        }
+    }
+    reached
 }
 
 /// A set with one more effect, for the likeliest of what could be missing around it, and for the family of the effect that was taken out.
@@ -234,15 +253,19 @@ pub fn best_of(pool: &[Hypothesis<'_>]) -> Option<usize> {
     best_below(pool, usize::MAX)
 }
 
+/// The set of so many effects with the most evidence.
+fn best_of_size(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
+    (0..pool.len())
+        .filter(|&i| pool[i].effects.len() == effects)
+        .max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence))
+}
+
 /// The set that stands among those of fewer effects than this.
 fn best_below(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
     let most = pool.iter().map(|h| h.effects.len()).filter(|&n| n < effects).max()?;
     let mut standing: Option<usize> = None;
     for size in 0..=most {
-        let of_size = (0..pool.len())
-            .filter(|&i| pool[i].effects.len() == size)
-            .max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence));
-        let Some(i) = of_size else { continue };
+        let Some(i) = best_of_size(pool, size) else { continue };
         match standing {
             Some(s)
                 if pool[i].log_evidence < pool[s].log_evidence + LEAST_GAIN * (size - pool[s].effects.len()) as f64 => {

@@ -1,58 +1,144 @@
-//! The finer form of a law: more terms of the same series, or a start of its own, where the recording is sharp enough to tell them.
+//! The forms of a law: a smooth series, more terms of it, terms whose places are fitted, a start of its own.
 //!
-//! A hysteresis made of plays is a sum over as many as one likes. Three follow a loop that noise blurs; six follow one that stands far above the
-//! noise, where what three leave would pass for another effect. The evidence decides, so that no recording pays for terms that it cannot tell.
+//! A hysteresis made of plays is a sum over as many as one likes. Three weights follow a loop that noise blurs; a density of two parameters
+//! follows a smooth one at a lower price and beyond what the recording reached; six weights follow one that stands far above the noise, where
+//! what three leave would pass for another effect. The evidence decides, so that no recording pays for terms that it cannot tell.
 
 use crate::budget::Step;
-use crate::fitting::finish;
+use crate::fitting::{Part, assemble, finish};
 use crate::hypothesis::{Effect, Hypothesis, Setting};
-use crate::mechanism::{Amplitude, Purpose};
+use crate::mechanism::{Law, Purpose, Role};
 use crate::model::Values;
-use crate::screen::{rewrite_at, with_added_starts};
+use crate::screen::rewrite_at;
 
-/// Log evidence that an effect must have brought before a finer form of its law is tried.
+/// Log evidence that an effect must have brought before a form with more unknowns is tried.
 const WORTH_REFINING: f64 = 10.0;
+/// Log evidence that an effect may lack where a form has no more unknowns than it has now.
+const WORTH_RECASTING: f64 = -5.0;
+/// Iterations of a fit that tells from which start a form is fitted.
+const SKETCH: usize = 3;
+/// Most starts of a form.
+const MOST_STARTS: usize = 4;
 
-/// The hypothesis with its last effect's law in its finer form, if there is one and it has more evidence.
-pub fn finer<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, h: &Hypothesis<'d>) -> Option<Hypothesis<'d>> {
-    let effect = h.effects.last()?;
-    let forms = [Purpose::Refit, Purpose::Finer].map(|purpose| (effect.mechanism.law)(&effect.slot, purpose));
-    if forms[0] == forms[1] || h.log_evidence < parent.log_evidence + WORTH_REFINING || setting.budget.omits(Step::Fits)
-    {
-        return None;
+/// The hypothesis with the law of its `index`-th effect in another form, if there is one that has more evidence: the one with the most.
+///
+/// `trunk` is a hypothesis of the first effects of this one, before that effect; those that follow are written into it anew.
+pub fn finer<'d>(
+    setting: &Setting<'d>,
+    trunk: &Hypothesis<'_>,
+    h: &Hypothesis<'d>,
+    index: usize,
+) -> Option<Hypothesis<'d>> {
+    let effect = h.effects.get(index)?;
+    let now = unknowns(&effect.mechanism.law_at(&effect.slot, effect.written.purpose));
+    let mut best: Option<Hypothesis<'d>> = None;
+    for purpose in effect.mechanism.forms(&effect.slot) {
+        let more = unknowns(&effect.mechanism.law_at(&effect.slot, purpose)) > now;
+        let worth = if more { WORTH_REFINING } else { WORTH_RECASTING };
+        if purpose == effect.written.purpose || h.log_evidence < trunk.log_evidence + worth {
+            continue;
+        }
+        if setting.budget.omits(Step::Fits) {
+            break;
+        }
+        let standing = best.as_ref().unwrap_or(h).log_evidence;
+        best = written_as(setting, trunk, h, index, purpose).filter(|other| other.log_evidence > standing).or(best);
     }
-    let (base, label) = (&parent.base, &effect.slot.label);
-    let (written, slot) =
-        rewrite_at(base, &base.document(), &setting.original, effect.mechanism, label, Purpose::Finer)?;
-    let coarse = h.base.values();
-    let mut from = with_added_starts(&coarse, &written, &slot, setting.data.stretches.len());
-    for p in &written.simulation.parameters {
-        from.parameters.entry(p.name.clone()).and_modify(|x| *x = x.clamp(p.lower(), p.upper()));
-    }
-    for (name, value) in spread(&coarse, &effect.written.amplitudes, &written.amplitudes) {
-        from.parameters.insert(name, value);
-    }
-    let fitted = setting.fit(&written.simulation, &from, Some(&h.base.whitener), 1, setting.iterations)?;
-    let mut effects = parent.effects.clone();
-    effects.push(Effect { written, slot, ..effect.clone() });
-    let mut more = setting.hypothesis(effects, fitted);
-    finish(setting, &mut more, parent.effects.len());
-    (more.log_evidence > h.log_evidence).then_some(more)
+    best
 }
 
-/// Start values for a longer series of terms: those of the shorter one, each over as many terms as stand in its place.
-fn spread(coarse: &Values, few: &[Amplitude], many: &[Amplitude]) -> Vec<(String, f64)> {
-    let series = |a: &Amplitude| a.name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
-    let value = |a: &Amplitude| coarse.parameters.get(&a.name).copied().unwrap_or(0.0);
-    let mut out = Vec::new();
-    for one in many {
-        let old: Vec<&Amplitude> = few.iter().filter(|a| series(a) == series(one)).collect();
-        let new: Vec<&Amplitude> = many.iter().filter(|a| series(a) == series(one)).collect();
-        let place = new.iter().position(|a| a.name == one.name).unwrap_or(0) * old.len() / new.len().max(1);
-        let shares = new.len() as f64 / old.len().max(1) as f64;
-        out.extend(old.get(place).map(|a| (one.name.clone(), value(a) / shares)));
+/// What a law asks of the recording.
+fn unknowns(law: &Law) -> usize {
+    law.parameters.iter().filter(|p| !matches!(p.role, Role::Constant(_))).count()
+}
+
+/// The hypothesis with the law of its `index`-th effect in this form.
+fn written_as<'d>(
+    setting: &Setting<'d>,
+    trunk: &Hypothesis<'_>,
+    h: &Hypothesis<'d>,
+    index: usize,
+    purpose: Purpose,
+) -> Option<Hypothesis<'d>> {
+    let first = trunk.effects.len();
+    let values = h.base.values();
+    let effect = &h.effects[index];
+    let (slot, mechanism) = (&effect.slot, effect.mechanism);
+    let (written, _) =
+        rewrite_at(&trunk.base, &trunk.base.document(), &setting.original, mechanism, &slot.label, purpose)?;
+    let old = named(&mechanism.law_at(slot, effect.written.purpose), effect, &values);
+    let names = Names::of(&mechanism.law_at(slot, purpose));
+    // What the present form says too is kept; the rest starts at the points of its grid.
+    let kept = |name: &String| old.1.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
+    let mut starts: Vec<Vec<Option<f64>>> = Vec::new();
+    for point in written.starts() {
+        let shapes = names.shapes.iter().zip(point).map(|(name, (_, value))| kept(name).or(Some(value)));
+        let start: Vec<Option<f64>> = spread(&old.0, &names.amplitudes).into_iter().chain(shapes).collect();
+        if !starts.contains(&start) {
+            starts.push(start);
+        }
     }
-    out
+    let every = starts.len().div_ceil(MOST_STARTS).max(1);
+    let begun = starts.into_iter().step_by(every).filter_map(|start| {
+        let mut parts: Vec<Part> = h.effects[first..].iter().map(|e| Part::of_effect(e, &values)).collect();
+        parts[index - first] = Part { purpose, values: start, ..Part::of_effect(effect, &values) };
+        assemble(setting, trunk, &values, &parts, &h.base.whitener, SKETCH)
+    });
+    let mut best = begun.max_by(|a, b| a.base.log_likelihood.total_cmp(&b.base.log_likelihood))?;
+    if let Some(base) = setting.further(&best.base, Some(&h.base.whitener), 1, setting.iterations) {
+        best.base = base;
+    }
+    finish(setting, &mut best, first);
+    Some(best)
+}
+
+/// The names that a law has for what is fitted.
+struct Names {
+    amplitudes: Vec<String>,
+    shapes: Vec<String>,
+}
+
+impl Names {
+    fn of(law: &Law) -> Self {
+        let of_role = |wanted: fn(&Role) -> bool| -> Vec<String> {
+            law.parameters.iter().filter(|p| wanted(&p.role)).map(|p| p.name.clone()).collect()
+        };
+        Self {
+            amplitudes: of_role(|r| matches!(r, Role::Amplitude)),
+            shapes: of_role(|r| matches!(r, Role::Shape(_))),
+        }
+    }
+}
+
+/// A value under the name that the law has for it.
+type Named = (String, f64);
+
+/// The amplitudes and the shapes of an effect that was fitted.
+fn named(law: &Law, effect: &Effect, values: &Values) -> (Vec<Named>, Vec<Named>) {
+    let names = Names::of(law);
+    let value = |name: &String| values.parameters.get(name).copied().unwrap_or(0.0);
+    let amplitudes = names.amplitudes.into_iter().zip(effect.written.amplitudes.iter().map(|a| value(&a.name)));
+    let shapes = names.shapes.into_iter().zip(effect.written.shapes.iter().map(|s| value(&s.name)));
+    (amplitudes.collect(), shapes.collect())
+}
+
+/// Start values for another series of terms: each of the old ones over as many terms as stand in its place, or the sum of those in whose place
+/// one stands.
+fn spread(old: &[Named], new: &[String]) -> Vec<Option<f64>> {
+    let series = |name: &str| name.split('_').next().unwrap_or(name).to_owned();
+    let one = |name: &String| {
+        let few: Vec<f64> = old.iter().filter(|(n, _)| series(n) == series(name)).map(|(_, value)| *value).collect();
+        let many: Vec<&String> = new.iter().filter(|n| series(n) == series(name)).collect();
+        let place = many.iter().position(|n| *n == name)?;
+        // Both cut the same whole into equal shares: what of each old share lies within the new one.
+        let (from, to) = (place as f64 / many.len() as f64, (place + 1) as f64 / many.len() as f64);
+        let share = |i: usize| {
+            let (a, b) = (i as f64 / few.len() as f64, (i + 1) as f64 / few.len() as f64);
+            (b.min(to) - a.max(from)).max(0.0) * few.len() as f64
+        };
+        (!few.is_empty()).then(|| few.iter().enumerate().map(|(i, value)| value * share(i)).sum())
+    };
+    new.iter().map(one).collect()
 }
 
 #[cfg(test)]
@@ -60,17 +146,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_weight_is_spread_over_the_terms_in_its_place() {
-        let named = |names: &[&str]| -> Vec<Amplitude> {
-            names.iter().map(|n| Amplitude { name: (*n).to_owned(), size: 1.0 }).collect()
+    fn weights_are_spread_over_the_terms_in_their_place() {
+        let check = |old: &[(&str, f64)], new: &[&str], expected: &[Option<f64>]| {
+            let old: Vec<Named> = old.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
+            let new: Vec<String> = new.iter().map(|n| (*n).to_owned()).collect();
+            let found = spread(&old, &new);
+            assert_eq!(found.len(), expected.len());
+            for (f, e) in found.iter().zip(expected) {
+                let near = match (f, e) {
+                    (Some(f), Some(e)) => (f - e).abs() < 1e-12,
+                    (f, e) => f == e,
+                };
+                assert!(near, "{old:?} as {new:?}: {found:?}");
+            }
         };
-        let mut coarse = Values::default();
-        for (name, value) in [("p_1", 0.2), ("p_2", 0.4), ("a_h", 0.7)] {
-            coarse.parameters.insert(name.to_owned(), value);
-        }
-        let many = named(&["p_1", "p_2", "p_3", "p_4", "a_h", "q_1"]);
-        let found = spread(&coarse, &named(&["p_1", "p_2", "a_h"]), &many);
-        let expected = [("p_1", 0.1), ("p_2", 0.1), ("p_3", 0.2), ("p_4", 0.2), ("a_h", 0.7)];
-        assert_eq!(found, expected.map(|(n, v)| (n.to_owned(), v)));
+        let old = [("p_1", 0.2), ("p_2", 0.4), ("a_h", 0.7)];
+        let more = [Some(0.1), Some(0.1), Some(0.2), Some(0.2), Some(0.7), None];
+        check(&old, &["p_1", "p_2", "p_3", "p_4", "a_h", "q_1"], &more);
+        check(&old, &["p", "a_h"], &[Some(0.6), Some(0.7)]);
+        check(&old, &["p_1", "p_2", "p_3"], &[Some(0.2 * 2.0 / 3.0), Some(0.2), Some(0.4 * 2.0 / 3.0)]);
     }
 }

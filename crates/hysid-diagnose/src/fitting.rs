@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::base::Base;
 use crate::budget::Step;
 use crate::calibrate::calibrated_copy;
+use crate::evidence::Whitener;
 use crate::finer::finer;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::{Mechanism, Purpose};
@@ -150,7 +151,7 @@ fn refit_from<'d>(
     }
     let mut h = hypothesis(setting, parent, candidate, best?);
     finish(setting, &mut h, parent.effects.len());
-    Some(finer(setting, parent, &h).unwrap_or(h))
+    Some(finer(setting, parent, &h, parent.effects.len()).unwrap_or(h))
 }
 
 /// The end of a fit: shapes that least squares cannot move, of the effects from `from` on, then a round under the hypothesis' own noise.
@@ -335,20 +336,22 @@ impl Part {
     }
 }
 
-/// Several effects written into the simulation of `none` one after the other and fitted for `iterations` from these values.
+/// Several effects written into the simulation of `trunk` one after the other and fitted for `iterations` from these values, first under
+/// this noise model.
 pub fn assemble<'d>(
     setting: &Setting<'d>,
-    none: &Hypothesis<'d>,
+    trunk: &Hypothesis<'_>,
     own: &Values,
     parts: &[Part],
+    noise: &Whitener,
     iterations: usize,
 ) -> Option<Hypothesis<'d>> {
-    let mut document = none.base.document();
+    let mut document = trunk.base.document();
     let mut values = own.clone();
-    let mut effects = Vec::new();
+    let mut effects = trunk.effects.clone();
     for part in parts {
         let (written, slot) =
-            rewrite_at(&none.base, &document, &setting.original, part.mechanism, &part.slot, part.purpose)?;
+            rewrite_at(&trunk.base, &document, &setting.original, part.mechanism, &part.slot, part.purpose)?;
         values = with_added_starts(&values, &written, &slot, setting.data.stretches.len());
         for (name, x) in written.parameters_of().iter().zip(&part.values) {
             if let (Some(x), Some(p)) = (x, written.simulation.parameter(name)) {
@@ -358,7 +361,7 @@ pub fn assemble<'d>(
         document = written.simulation.clone();
         effects.push(Effect { mechanism: part.mechanism, slot, written, concealment: part.concealment });
     }
-    let base = setting.fit(&document, &values, Some(&none.base.whitener), 1, iterations)?;
+    let base = setting.fit(&document, &values, Some(noise), 1, iterations)?;
     Some(setting.hypothesis(effects, base))
 }
 
@@ -388,5 +391,5 @@ pub fn without<'d>(
     if rest.is_empty() {
         return None;
     }
-    assemble(setting, none, &values, &rest, setting.iterations).map(|h| complete(setting, h))
+    assemble(setting, none, &values, &rest, &none.base.whitener, setting.iterations).map(|h| complete(setting, h))
 }

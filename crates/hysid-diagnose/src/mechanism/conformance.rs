@@ -98,7 +98,7 @@ pub fn check_form(
             what,
         });
     };
-    for purpose in [Purpose::Screening, Purpose::Refit, Purpose::Finer] {
+    for purpose in std::iter::once(Purpose::Screening).chain(mechanism.forms(slot)) {
         let written = match mechanism.rewrite(simulation, slot, signals, purpose) {
             Ok(written) => written,
             Err(e) => {
@@ -148,19 +148,19 @@ pub fn check_form(
                 }
             }
         }
-        if purpose == Purpose::Refit {
+        if purpose != Purpose::Screening {
             let values: Vec<Value> = written
                 .report
                 .iter()
                 .map(|r| Value { name: r.name.clone(), value: 1.0, unit: r.unit.clone() })
                 .collect();
-            for named in placeholders(mechanism.sentence) {
+            for named in placeholders(mechanism.sentence, purpose == Purpose::Refit) {
                 if named != "place" && named != "parameter" && !values.iter().any(|v| v.name == named) {
                     breach(format!("the sentence names {named}, which is not reported"));
                 }
             }
             let told = mechanism.tell(slot, &values);
-            if told.contains('{') || told.contains("  ") || !told.ends_with('.') {
+            if told.contains(['{', '[']) || told.contains("  ") || !told.ends_with('.') {
                 breach(format!("the sentence is not complete: {told}"));
             }
         }
@@ -169,8 +169,11 @@ pub fn check_form(
     breaches
 }
 
-fn placeholders(sentence: &str) -> Vec<&str> {
-    sentence.split('{').skip(1).filter_map(|part| part.split_once('}').map(|(name, _)| name)).collect()
+/// The values that a sentence names; the plain form has those in brackets too.
+fn placeholders(sentence: &str, plain: bool) -> Vec<&str> {
+    let parts = sentence.split(['[', ']']).enumerate().filter(|(i, _)| plain || i % 2 == 0);
+    let named = parts.flat_map(|(_, part)| part.split('{').skip(1));
+    named.filter_map(|part| part.split_once('}').map(|(name, _)| name)).collect()
 }
 
 /// [`check_form`] for every mechanism at every slot of a simulation.

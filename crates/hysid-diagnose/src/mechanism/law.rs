@@ -14,8 +14,25 @@ pub enum Purpose {
     Screening,
     /// To be fitted and handed out: the physical parameters.
     Refit,
-    /// The same with more in it, for recordings that are sharp enough to tell: six plays in place of three, a lag that does not start settled.
+    /// The same in another form, which competes with the plain one by its evidence.
+    Form(Form),
+}
+
+/// Another form of a law. A law that has no such form is written as the plain one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Form {
+    /// A series with a few shape parameters in place of a weight for each term: a smooth density of plays.
+    Smooth,
+    /// More terms, for recordings that are sharp enough to tell: six plays in place of three, a lag that does not start settled.
     Finer,
+    /// More terms, whose places are fitted too: six plays with a spacing of their own.
+    Spaced,
+}
+
+impl Purpose {
+    /// What a law is fitted as, in the order in which the forms are tried.
+    pub const FITTED: [Self; 4] =
+        [Self::Refit, Self::Form(Form::Smooth), Self::Form(Form::Finer), Self::Form(Form::Spaced)];
 }
 
 /// How the law's text enters the simulation at its slot.

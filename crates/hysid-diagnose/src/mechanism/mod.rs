@@ -44,7 +44,7 @@ use crate::slot::{Place, Slot, Structure};
 
 pub use excitation::Need;
 pub use family::{Block, Family};
-pub use law::{Change, Derived, Grid, Law, LawParameter, LawState, Purpose, Role, Start};
+pub use law::{Change, Derived, Form, Grid, Law, LawParameter, LawState, Purpose, Role, Start};
 pub(crate) use law::{log_grid, log_steps};
 pub use page::catalogue_page;
 pub use rewrite::RewriteError;
@@ -126,6 +126,18 @@ impl Mechanism {
     pub(crate) fn law_at(&self, slot: &Slot, purpose: Purpose) -> Law {
         let law = (self.law)(slot, purpose);
         if slot.has("control") && self.family.follows_control() { law.controlled() } else { law }
+    }
+
+    /// What the law at a slot can be fitted as, the plain form first; forms that it has not got are left out.
+    pub fn forms(&self, slot: &Slot) -> Vec<Purpose> {
+        let mut known: Vec<(Purpose, Law)> = Vec::new();
+        for purpose in Purpose::FITTED {
+            let law = self.law_at(slot, purpose);
+            if known.iter().all(|(_, other)| *other != law) {
+                known.push((purpose, law));
+            }
+        }
+        known.into_iter().map(|(purpose, _)| purpose).collect()
     }
 
     /// What the recording lacks for this mechanism to be seen at the slot, in words; `None` when nothing is lacking.

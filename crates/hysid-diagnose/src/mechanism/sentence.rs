@@ -36,26 +36,37 @@ pub fn number_with_unit(value: f64, unit: Option<&Unit>) -> String {
 impl Mechanism {
     /// What to tell people: the values with their units, and where the effect is.
     ///
-    /// A value that is not given is left out of the sentence together with its braces.
+    /// A value that is not given is left out of the sentence together with its braces, and with the brackets around it where there are any:
+    /// not every form of a law has it.
     pub fn tell(&self, slot: &Slot, values: &[Value]) -> String {
         let mut told = String::with_capacity(self.sentence.len() + 40);
-        let mut rest = self.sentence;
-        while let Some((before, after)) = rest.split_once('{') {
-            told.push_str(before);
-            let (name, behind) = after.split_once('}').unwrap_or((after, ""));
-            match name {
-                "place" | "parameter" => told.push_str(&slot.whereabouts),
-                _ => {
-                    if let Some(found) = values.iter().find(|v| v.name == name) {
-                        told.push_str(&number_with_unit(found.value, found.unit.as_ref()));
-                    }
-                }
+        for (i, part) in self.sentence.split(['[', ']']).enumerate() {
+            let (text, complete) = filled(part, slot, values);
+            // Every other part stands in brackets.
+            if complete || i % 2 == 0 {
+                told.push_str(&text);
             }
-            rest = behind;
         }
-        told.push_str(rest);
         told
     }
+}
+
+/// A part of a sentence with its values, and whether all of them were given.
+fn filled(part: &str, slot: &Slot, values: &[Value]) -> (String, bool) {
+    let (mut told, mut complete) = (String::new(), true);
+    let mut rest = part;
+    while let Some((before, after)) = rest.split_once('{') {
+        told.push_str(before);
+        let (name, behind) = after.split_once('}').unwrap_or((after, ""));
+        match (name, values.iter().find(|v| v.name == name)) {
+            ("place" | "parameter", _) => told.push_str(&slot.whereabouts),
+            (_, Some(found)) => told.push_str(&number_with_unit(found.value, found.unit.as_ref())),
+            (_, None) => complete = false,
+        }
+        rest = behind;
+    }
+    told.push_str(rest);
+    (told, complete)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Hysteresis of an actuator with a one-sided characteristic behind it.
 
-use super::{how_many, plays, with_radii};
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere};
+use super::plays::Plays;
+use crate::mechanism::{Block, Family, Grid, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
 /// Hysteresis of an actuator with a one-sided characteristic behind it.
@@ -13,16 +13,14 @@ pub static ASYMMETRIC_HYSTERESIS: Mechanism = Mechanism {
     applies: anywhere,
     already: &["max(Z - P, 0)"],
     law: |_, purpose| {
-        let count = how_many(purpose);
-        let law = match purpose {
+        let plays = Plays(purpose);
+        let h = plays.sum(|r| format!("play(u, {r})"));
+        let text = match purpose {
             // Linear in its amplitudes: the one-sided part acts on the bare input.
-            Purpose::Screening => Law::replace(format!("u{} + a_h*max(u - u_h, 0)", plays("u", count))),
-            Purpose::Refit | Purpose::Finer => {
-                let h = format!("(u{})", plays("u", count));
-                Law::replace(format!("{h} + a_h*max({h} - u_h, 0)"))
-            }
+            Purpose::Screening => format!("{h} + a_h*max(u - u_h, 0)"),
+            Purpose::Refit | Purpose::Form(_) => format!("({h}) + a_h*max(({h}) - u_h, 0)"),
         };
-        with_radii(law, "u", count).amplitude("a_h", "1", -0.9, 2.0).shape(
+        plays.law(text).amplitude("a_h", "1", -0.9, 2.0).shape(
             "u_h",
             "u",
             Grid::SignedQuantiles("u", vec![0.3, 0.5, 0.7]),

@@ -1,10 +1,10 @@
 //! Hysteresis of an actuator with a general weight over its turning points.
 
-use super::{plays, with_radii};
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, anywhere};
+use super::plays::Plays;
+use crate::mechanism::{Block, Family, Form, Grid, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
-/// Plays in the law: each has three amplitudes, and twice as many follow one recording and no other.
+/// Plays in the plain form: each has three amplitudes, and twice as many follow one recording and no other.
 const PLAYS: usize = 3;
 
 /// Hysteresis of an actuator with a general weight over its turning points.
@@ -15,14 +15,28 @@ pub static PREISACH: Mechanism = Mechanism {
     places: &[Place::Input],
     applies: anywhere,
     already: &["play(u, R)^P", "relay(u, P, Q)"],
-    law: |_, _| {
-        // Preisach's model in play coordinates: a curved function of each play, here of degree three, which goes on as a straight line beyond
-        // what the recording reached: a cubic that runs on is no model of a hysteresis.
-        let within = |i: usize| format!("max(min(play(u, r_{i}), u_m), -u_m)");
-        let bent: String = (1..=PLAYS)
-            .map(|i| format!(" + play(u, r_{i})*(q_{i}*{w}/u_r + s_{i}*{w}^2/u_r^2)", w = within(i)))
-            .collect();
-        let mut law = with_radii(Law::replace(format!("u{}{bent}", plays("u", PLAYS))), "u", PLAYS);
+    law: |_, purpose| {
+        // Preisach's model in play coordinates: a curved function of each play, which goes on as a straight line beyond what the recording
+        // reached: a polynomial that runs on is no model of a hysteresis.
+        let play = |r: &str| format!("play(u, {r})");
+        let within = |r: &str| format!("max(min({}, u_m), -u_m)", play(r));
+        if purpose == Purpose::Form(Form::Smooth) {
+            // Of degree two, alike for all: the density is a product of a function of the half-width and one of the level.
+            let plays = Plays(purpose);
+            return plays
+                .law(plays.sum(|r| format!("{}*(1 + b*{}/u_r)", play(r), within(r))))
+                .amplitude("b", "1", -1.0, 1.0)
+                .constant("u_r", "u", Grid::Reach("u", vec![1.0]))
+                .constant("u_m", "u", Grid::Quantiles("u", vec![1.0]));
+        }
+        // Of degree three, each on its own.
+        let plays = Plays(Purpose::Refit);
+        let curved = |i: usize| {
+            let r = format!("r_{i}");
+            format!(" + {}*(q_{i}*{w}/u_r + s_{i}*{w}^2/u_r^2)", play(&r), w = within(&r))
+        };
+        let bent: String = (1..=PLAYS).map(curved).collect();
+        let mut law = plays.law(format!("{}{bent}", plays.sum(play)));
         law =
             law.constant("u_r", "u", Grid::Reach("u", vec![1.0])).constant("u_m", "u", Grid::Quantiles("u", vec![1.0]));
         for i in 1..=PLAYS {

@@ -1,7 +1,7 @@
 //! Hysteresis of an actuator whose loop widens with the rate.
 
-use super::{how_many, with_radii};
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere, log_grid};
+use super::plays::Plays;
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere, log_grid};
 use crate::slot::Place;
 
 /// Hysteresis of an actuator whose loop widens with the rate.
@@ -13,23 +13,24 @@ pub static RATE_DEPENDENT_HYSTERESIS: Mechanism = Mechanism {
     applies: anywhere,
     already: &["lag(play(u, R), P)"],
     law: |_, purpose| {
-        let count = how_many(purpose);
         // Plays in series with a lag. Thresholds that grow with the rate do the same to first order, each play by a lag of its own where they
         // grow in proportion; only sharp recordings tell the difference.
-        let wide = if purpose == Purpose::Finer { "*(1 + lambda*abs(d(u)))" } else { "" };
-        let lagged: String = (1..=count).map(|i| format!(" + p_{i}*(lag(play(u, r_{i}{wide}), tau) - u)")).collect();
-        let law = with_radii(Law::replace(format!("u{lagged}")), "u", count)
-            .shape("tau", "h", log_grid(0.5, 50.0, 4))
-            .within(0.05, 1000.0);
+        let plays = Plays(purpose);
+        let wide = |r: &str| format!("play(u, {r}*(1 + lambda*abs(d(u))))");
+        let lag = |law: Law| law.shape("tau", "h", log_grid(0.5, 50.0, 4)).within(0.05, 1000.0);
+        let growth = |law: Law| law.shape("lambda", "h/u", Grid::Values(vec![5.0])).within(0.0, 1000.0);
         match purpose {
-            Purpose::Screening | Purpose::Refit => law,
-            Purpose::Finer => law.shape("lambda", "h/u", Grid::Values(vec![0.0, 5.0])).within(0.0, 1000.0),
+            Purpose::Screening | Purpose::Refit => lag(plays.law(plays.sum(|r| format!("lag(play(u, {r}), tau)")))),
+            Purpose::Form(Form::Smooth) => growth(plays.law(plays.sum(wide))),
+            Purpose::Form(Form::Finer | Form::Spaced) => {
+                growth(lag(plays.law(plays.sum(|r| format!("lag({}, tau)", wide(r))))))
+            }
         }
     },
     contains: &["prandtl_ishlinskii", "backlash"],
     confusable: &["prandtl_ishlinskii", "actuator_lag", "viscoelastic"],
     needs: &[Need::Turns(12), Need::Band(4.0)],
-    sentence: "The actuator {place} has a hysteresis loop that widens with the rate: its plays lag by {tau}.",
+    sentence: "The actuator {place} has a hysteresis loop that widens with the rate: its plays carry {share} of the gain[ and lag by {tau}].",
     signature: "The loop widens with the frequency but does not vanish at slow rates.",
     reference: "M. Al Janaideh, S. Rakheja, C.-Y. Su, An analytical generalized Prandtl-Ishlinskii model inversion, IEEE/ASME Trans. Mechatron. 16 (2011) 734-744; W. T. Ang, P. K. Khosla, C. N. Riviere (2007)",
 };

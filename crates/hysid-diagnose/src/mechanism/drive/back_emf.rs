@@ -1,7 +1,7 @@
 //! The electrical side of a drive: induced voltage and inductance.
 
 use crate::mechanism::path::FASTEST;
-use crate::mechanism::{Block, Family, Law, Mechanism, Need, Purpose, log_grid};
+use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
 /// The electrical side of a drive: induced voltage and inductance.
@@ -18,18 +18,18 @@ pub static BACK_EMF: Mechanism = Mechanism {
             .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
             .within(0.02, 2000.0),
-        Purpose::Refit => Law::replace("lag(u - k_e*v, tau_e)")
-            .amplitude("k_e", "u/v", 0.0, 5.0)
-            .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
-            .within(0.02, 2000.0)
-            .never_baseline(),
         // A drive that is switched on has no current yet.
-        Purpose::Finer => Law::replace("u_e")
+        Purpose::Form(Form::Finer) => Law::replace("u_e")
             .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
             .within(FASTEST, 2000.0)
             .state("u_e", "u", "(u - k_e*v - u_e)/tau_e")
             .starting_free()
+            .never_baseline(),
+        Purpose::Refit | Purpose::Form(_) => Law::replace("lag(u - k_e*v, tau_e)")
+            .amplitude("k_e", "u/v", 0.0, 5.0)
+            .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
+            .within(0.02, 2000.0)
             .never_baseline(),
     },
     contains: &["actuator_lag"],

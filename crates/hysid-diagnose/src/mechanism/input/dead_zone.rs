@@ -15,7 +15,7 @@ pub static DEAD_ZONE: Mechanism = Mechanism {
         let width = Grid::Reach("u", log_steps(0.01, 0.5, 5));
         match purpose {
             Purpose::Screening => Law::replace("u - w*max(min(u, d_z), -d_z)").weight().shape("d_z", "u", width),
-            Purpose::Refit | Purpose::Finer => {
+            Purpose::Refit | Purpose::Form(_) => {
                 Law::replace("u - max(min(u, d_z), -d_z)").shape("d_z", "u", width).within(0.0, 3.0).neutral(0.0)
             }
         }

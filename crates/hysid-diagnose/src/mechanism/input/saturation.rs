@@ -25,7 +25,7 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
             Purpose::Screening => {
                 Law::replace("u + w*(max(min(u, s), -s) - u)").weight().shape("s", "u", level).searched()
             }
-            Purpose::Refit | Purpose::Finer => Law::replace("max(min(u, s), -s)").shape("s", "u", level).searched(),
+            Purpose::Refit | Purpose::Form(_) => Law::replace("max(min(u, s), -s)").shape("s", "u", level).searched(),
         }
     },
     contains: &[],

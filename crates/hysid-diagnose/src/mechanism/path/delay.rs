@@ -15,7 +15,7 @@ pub static DELAY: Mechanism = Mechanism {
         let s = if slot.place == Place::Sensor { "y" } else { "u" };
         let law = match purpose {
             Purpose::Screening => Law::replace(format!("{s} + w*(delay({s}, tau) - {s})")).weight(),
-            Purpose::Refit | Purpose::Finer => Law::replace(format!("delay({s}, tau)")),
+            Purpose::Refit | Purpose::Form(_) => Law::replace(format!("delay({s}, tau)")),
         };
         law.shape("tau", "h", log_grid(0.5, 20.0, 6)).within(0.0, 200.0).neutral(0.0)
     },

@@ -8,7 +8,7 @@ pub use actuator_lag::ACTUATOR_LAG;
 pub use delay::DELAY;
 pub use sensor_lag::SENSOR_LAG;
 
-use super::{Law, Purpose, log_grid};
+use super::{Form, Law, Purpose, log_grid};
 
 /// Shortest time constant of a lag that is written as a state, in samples: the integration must follow it.
 pub(super) const FASTEST: f64 = 0.4;
@@ -17,9 +17,11 @@ pub(super) const FASTEST: f64 = 0.4;
 fn first_order(signal: &str, purpose: Purpose) -> Law {
     let law = match purpose {
         Purpose::Screening => Law::replace(format!("{signal} + w*(lag({signal}, tau) - {signal})")).weight(),
-        Purpose::Refit => Law::replace(format!("lag({signal}, tau)")),
-        Purpose::Finer => Law::replace("s_l").state("s_l", signal, format!("({signal} - s_l)/tau")).starting_free(),
+        Purpose::Form(Form::Finer) => {
+            Law::replace("s_l").state("s_l", signal, format!("({signal} - s_l)/tau")).starting_free()
+        }
+        Purpose::Refit | Purpose::Form(_) => Law::replace(format!("lag({signal}, tau)")),
     };
-    let fastest = if purpose == Purpose::Finer { FASTEST } else { 0.02 };
+    let fastest = if purpose == Purpose::Form(Form::Finer) { FASTEST } else { 0.02 };
     law.shape("tau", "h", log_grid(0.5, 50.0, 6)).within(fastest, 2000.0)
 }

@@ -20,7 +20,7 @@ pub static BACKLASH: Mechanism = Mechanism {
                 let gap = Grid::Reach("x", log_steps(0.02, 0.7, 6));
                 return match purpose {
                     Purpose::Screening => Law::force("-w*k*max(min(x, r), -r)").weight().shape("r", "x", gap),
-                    Purpose::Refit | Purpose::Finer => {
+                    Purpose::Refit | Purpose::Form(_) => {
                         Law::force("-k*max(min(x, r), -r)").shape("r", "x", gap).within(0.0, 3.0).neutral(0.0)
                     }
                 };
@@ -31,7 +31,7 @@ pub static BACKLASH: Mechanism = Mechanism {
             Purpose::Screening => {
                 Law::replace(format!("{signal} + w*(play({signal}, r) - {signal})")).weight().shape("r", signal, width)
             }
-            Purpose::Refit | Purpose::Finer => {
+            Purpose::Refit | Purpose::Form(_) => {
                 Law::replace(format!("play({signal}, r)")).shape("r", signal, width).within(0.0, 3.0).neutral(0.0)
             }
         }

@@ -17,7 +17,7 @@ pub static OUTPUT_SATURATION: Mechanism = Mechanism {
             Purpose::Screening => {
                 Law::replace("y + w*(max(min(y, s), -s) - y)").weight().shape("s", "y", level).searched()
             }
-            Purpose::Refit | Purpose::Finer => Law::replace("max(min(y, s), -s)").shape("s", "y", level).searched(),
+            Purpose::Refit | Purpose::Form(_) => Law::replace("max(min(y, s), -s)").shape("s", "y", level).searched(),
         }
     },
     contains: &[],

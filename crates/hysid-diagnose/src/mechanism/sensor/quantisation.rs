@@ -13,7 +13,7 @@ pub static QUANTISATION: Mechanism = Mechanism {
     already: &["floor(y/P + Q)"],
     law: |_, purpose| match purpose {
         Purpose::Screening => Law::replace("y + w*(q*floor(y/q + 0.5) - y)").weight().shape("q", "y", Grid::Resolution),
-        Purpose::Refit | Purpose::Finer => Law::replace("q*floor(y/q + 0.5)").constant("q", "y", Grid::Resolution),
+        Purpose::Refit | Purpose::Form(_) => Law::replace("q*floor(y/q + 0.5)").constant("q", "y", Grid::Resolution),
     },
     contains: &[],
     confusable: &["backlash"],

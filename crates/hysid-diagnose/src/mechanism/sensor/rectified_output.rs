@@ -13,7 +13,7 @@ pub static RECTIFIED_OUTPUT: Mechanism = Mechanism {
     already: &["abs(y)", "sqrt(y^2)"],
     law: |_, purpose| match purpose {
         Purpose::Screening => Law::replace("y + w*(abs(y) - y)").weight(),
-        Purpose::Refit | Purpose::Finer => Law::replace("abs(y)"),
+        Purpose::Refit | Purpose::Form(_) => Law::replace("abs(y)"),
     },
     contains: &[],
     confusable: &["output_saturation"],

@@ -15,7 +15,7 @@ pub static SPRING_CLEARANCE: Mechanism = Mechanism {
         let gap = Grid::Quantiles("x", vec![0.1, 0.2, 0.35, 0.5, 0.7]);
         match purpose {
             Purpose::Screening => Law::force("-w*k*max(min(x, g), -g)").weight().shape("g", "x", gap),
-            Purpose::Refit | Purpose::Finer => {
+            Purpose::Refit | Purpose::Form(_) => {
                 Law::force("-k*max(min(x, g), -g)").shape("g", "x", gap).within(0.0, 3.0).neutral(0.0)
             }
         }
