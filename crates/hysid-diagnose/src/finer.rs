@@ -41,8 +41,15 @@ pub fn finer<'d>(
         if setting.budget.omits(Step::Fits) {
             break;
         }
-        let standing = best.as_ref().unwrap_or(h).log_evidence;
-        best = written_as(setting, trunk, h, index, purpose).filter(|other| other.log_evidence > standing).or(best);
+        let Some(other) = written_as(setting, trunk, h, index, purpose) else { continue };
+        // Where more unknowns bring nothing, still more of them will not.
+        let done = more && other.log_evidence < h.log_evidence;
+        if other.log_evidence > best.as_ref().unwrap_or(h).log_evidence {
+            best = Some(other);
+        }
+        if done {
+            break;
+        }
     }
     best
 }
@@ -103,10 +110,7 @@ impl Names {
         let of_role = |wanted: fn(&Role) -> bool| -> Vec<String> {
             law.parameters.iter().filter(|p| wanted(&p.role)).map(|p| p.name.clone()).collect()
         };
-        Self {
-            amplitudes: of_role(|r| matches!(r, Role::Amplitude)),
-            shapes: of_role(|r| matches!(r, Role::Shape(_))),
-        }
+        Self { amplitudes: of_role(|r| matches!(r, Role::Amplitude)), shapes: of_role(|r| matches!(r, Role::Shape(_))) }
     }
 }
 

@@ -66,7 +66,8 @@ pub fn catalogue_page() -> String {
          simulation's own stiffness and mass there, `t` time, `T` duration, `h` sampling period. In brackets stands what a parameter is measured\n\
          in: its unit, and its natural size on a recording. `w` is the weight of a form that exists for screening only. Where an input `control`\n\
          controls the simulation's own damping (the voltage of a magnetorheological damper), the forces of `dry_friction`, `presliding` and\n\
-         `hysteretic_spring` are multiplied by `1 + b_c*control`.\n",
+         `hysteretic_spring` are multiplied by `1 + b_c*control`. Laws are shown in their plain form; what not every form of a law tells stands in\n\
+         square brackets in its sentence.\n",
     );
     let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
     for family in Family::ALL {

@@ -61,9 +61,11 @@ impl Plays {
                 .amplitude("p", "1", -0.2, 5.0)
                 .shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0]))
                 .constant("r_w", "u", Grid::Reach("u", vec![1.0 / CELLS as f64])),
-            Purpose::Form(Form::Spaced) => (1..=SPACED)
-                .fold(law, weight)
-                .shape("r_s", "u", Grid::Reach("u", [0.8, 1.0, 1.2].map(|s| s / (SPACED + 1) as f64).to_vec())),
+            Purpose::Form(Form::Spaced) => (1..=SPACED).fold(law, weight).shape(
+                "r_s",
+                "u",
+                Grid::Reach("u", [0.8, 1.0, 1.2].map(|s| s / (SPACED + 1) as f64).to_vec()),
+            ),
             Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Finer) => {
                 self.radii().iter().zip(1..).fold(law, |law, (share, i)| {
                     weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
@@ -72,5 +74,107 @@ impl Plays {
         };
         let weights: Vec<String> = self.terms().into_iter().map(|(weight, _)| weight).collect();
         law.report("share", "1", weights.join(" + "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use hysid_plant::{Compiled, Direction, Drive, Run, Simulation};
+
+    use super::*;
+    use crate::mechanism::{Signals, mechanism};
+    use crate::slot::Structure;
+
+    /// What a law of plays answers to an input that is held from sample to sample, with its parameters as given.
+    fn answer(purpose: Purpose, values: &[(&str, f64)], input: &[f64]) -> (Vec<f64>, Simulation) {
+        let text = "title = \"Actuator\"\n[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_V\"\n[parameters]\n\
+                    g = { value = 1.0, min = 0.1, max = 10.0, unit = \"um/V\" }\n[outputs]\ny_um = \"g*u\"\n";
+        let simulation = Simulation::parse(text, "actuator.sim.toml").unwrap();
+        let law = mechanism("prandtl_ishlinskii").unwrap();
+        let slot = law.slots(&Structure::of(&simulation)).swap_remove(0);
+        let signals = Signals::new(0.01, 0.0, BTreeMap::from([("u".to_owned(), vec![-10.0, 10.0, -10.0, 10.0])]));
+        let mut written = law.rewrite(&simulation, &slot, &signals, purpose).unwrap().simulation;
+        for (name, value) in values {
+            written.parameter_mut(name).unwrap_or_else(|| panic!("{purpose:?} has no {name}")).value = *value;
+        }
+        let compiled = Compiled::new(&written).unwrap();
+        let drive = Drive::new(0.0, 0.01, input.len(), vec![input.to_vec()]).unwrap();
+        (compiled.simulate(&Run::new(&drive, &compiled.theta())).outputs.swap_remove(0), written)
+    }
+
+    fn values(purpose: Purpose) -> Vec<(&'static str, f64)> {
+        let six = [("p_1", 0.03), ("p_2", 0.08), ("p_3", 0.02), ("p_4", 0.06), ("p_5", 0.01), ("p_6", 0.05)];
+        match purpose {
+            Purpose::Screening | Purpose::Refit => six[..3].to_vec(),
+            Purpose::Form(Form::Finer) => six.to_vec(),
+            Purpose::Form(Form::Smooth) => vec![("p", 0.4), ("r_d", 4.0)],
+            Purpose::Form(Form::Spaced) => six.into_iter().chain([("r_s", 1.3)]).collect(),
+        }
+    }
+
+    /// Both branches of a loop of plays are the initial loading curve, doubled (Masing's rule).
+    #[test]
+    fn a_loop_is_twice_its_initial_loading_curve() {
+        let steps = 400;
+        let up: Vec<f64> = (0..=steps).map(|i| 9.0 * f64::from(i) / f64::from(steps)).collect();
+        let down: Vec<f64> = up.iter().map(|u| 9.0 - 2.0 * u).collect();
+        let back: Vec<f64> = down.iter().map(|u| -u).collect();
+        for purpose in Purpose::FITTED {
+            let (y, _) = answer(purpose, &values(purpose), &[&up[..], &down[..], &back[..]].concat());
+            let (loading, rest) = y.split_at(up.len());
+            let (falling, rising) = rest.split_at(up.len());
+            for (i, first) in loading.iter().enumerate() {
+                let (fall, rise) = (falling[0] - falling[i], rising[i] - rising[0]);
+                assert!((fall - 2.0 * first).abs() < 1e-9, "{purpose:?} at {}: {fall} for {first}", down[i]);
+                assert!((rise - fall).abs() < 1e-9, "{purpose:?}: the loop is not closed");
+            }
+            assert!((rising[steps as usize] - falling[0]).abs() < 1e-9, "{purpose:?}: the loop is not closed");
+        }
+    }
+
+    /// The initial loading curve of a normal density is its integral, taken twice: twelve cells give it to a thousandth of the reach.
+    #[test]
+    fn twelve_cells_are_a_density() {
+        let (share, width, reach) = (0.4, 4.0, 10.0);
+        let up: Vec<f64> = (0..=100).map(|i| 0.1 * f64::from(i)).collect();
+        let (y, _) = answer(Purpose::Form(Form::Smooth), &[("p", share), ("r_d", width)], &up);
+        let fine = 20_000;
+        let cell = reach / f64::from(fine);
+        for (u, y) in up.iter().zip(y) {
+            let lost = |i: i32| {
+                let r = cell * (f64::from(i) + 0.5);
+                (-(r / width).powi(2)).exp() * cell / reach * r.min(*u)
+            };
+            let expected = u - share * (0..fine).map(lost).sum::<f64>();
+            assert!((y - expected).abs() < 1e-3 * reach, "{y} for {expected} at {u}");
+        }
+    }
+
+    /// The derivative by a half-width that is fitted is that of the response.
+    #[test]
+    fn the_response_moves_with_a_fitted_half_width() {
+        let input: Vec<f64> =
+            (0..300).map(|i| 9.0 * (0.05 * f64::from(i)).sin() * (0.013 * f64::from(i)).cos()).collect();
+        for (purpose, name, at) in [(Form::Smooth, "r_d", 4.0), (Form::Spaced, "r_s", 1.3)] {
+            let purpose = Purpose::Form(purpose);
+            let shifted = |by: f64| -> Vec<f64> {
+                let mut set = values(purpose);
+                set.iter_mut().filter(|(n, _)| *n == name).for_each(|(_, v)| *v = at + by);
+                answer(purpose, &set, &input).0
+            };
+            let (_, written) = answer(purpose, &values(purpose), &input);
+            let compiled = Compiled::new(&written).unwrap();
+            let drive = Drive::new(0.0, 0.01, input.len(), vec![input.clone()]).unwrap();
+            let direction = Direction::Parameter(compiled.parameter_index(name).unwrap());
+            let theta = compiled.theta();
+            let tangents = compiled.sensitivities(&Run::new(&drive, &theta), &[direction]).tangents;
+            let step = 1e-6;
+            let numeric = shifted(step).into_iter().zip(shifted(-step)).map(|(a, b)| (a - b) / (2.0 * step));
+            let wrong = numeric.zip(&tangents[0][0]).filter(|(n, t)| (n - *t).abs() > 1e-4).count();
+            // At a knee the two sides differ.
+            assert!(wrong <= input.len() / 50, "{purpose:?}: {wrong} samples");
+        }
     }
 }

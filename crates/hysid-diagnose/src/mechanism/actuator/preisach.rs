@@ -20,14 +20,19 @@ pub static PREISACH: Mechanism = Mechanism {
         // reached: a polynomial that runs on is no model of a hysteresis.
         let play = |r: &str| format!("play(u, {r})");
         let within = |r: &str| format!("max(min({}, u_m), -u_m)", play(r));
-        if purpose == Purpose::Form(Form::Smooth) {
-            // Of degree two, alike for all: the density is a product of a function of the half-width and one of the level.
-            let plays = Plays(purpose);
-            return plays
-                .law(plays.sum(|r| format!("{}*(1 + b*{}/u_r)", play(r), within(r))))
+        if let Purpose::Form(form @ (Form::Smooth | Form::Finer)) = purpose {
+            // Alike for all plays: the density is a product of a function of the half-width and one of the level.
+            let plays = Plays(Purpose::Form(Form::Smooth));
+            let level = |r: &str| match form {
+                Form::Finer => format!("1 + b*{w}/u_r + c*{w}^2/u_r^2", w = within(r)),
+                _ => format!("1 + b*{}/u_r", within(r)),
+            };
+            let law = plays
+                .law(plays.sum(|r| format!("{}*({})", play(r), level(r))))
                 .amplitude("b", "1", -1.0, 1.0)
                 .constant("u_r", "u", Grid::Reach("u", vec![1.0]))
                 .constant("u_m", "u", Grid::Quantiles("u", vec![1.0]));
+            return if form == Form::Finer { law.amplitude("c", "1", -1.0, 1.0) } else { law };
         }
         // Of degree three, each on its own.
         let plays = Plays(Purpose::Refit);

@@ -1,0 +1,103 @@
+//! Whole diagnoses of an actuator whose recordings come from plays of the tests' own: the form of the law is the one that the recording asks for.
+
+#[path = "common/oscillator.rs"]
+mod oscillator;
+
+use hysid_diagnose::file::ParameterRecord;
+use hysid_diagnose::{Diagnosis, Hooks, Options, Request, diagnose};
+use hysid_plant::Simulation;
+use hysid_signal::{Channel, Clock, Recording};
+use oscillator::{PERIOD, drive, normal};
+
+/// A static actuator with a gain that is somewhat wrong.
+const BASELINE: &str = r#"
+title = "Actuator"
+[time]
+column = "t_s"
+[inputs]
+u = "u_V"
+[parameters]
+g = { value = 0.13, min = 0.01, max = 1.0, unit = "um/V" }
+[outputs]
+y_um = "g*u"
+"#;
+
+/// The gain of the real one, in um/V.
+const GAIN: f64 = 0.1;
+
+/// What a sum of plays (weight, half-width in V) makes of the input, in um, with noise of this size in um.
+fn recording(name: &str, seed: u64, plays: &[(f64, f64)], noise: f64) -> Recording {
+    let mut random = normal(seed);
+    let u = drive(1200, &mut random);
+    // At rest before: each play in the middle of its band.
+    let mut held = vec![u[0]; plays.len()];
+    let y = u.iter().map(|&u| {
+        let mut sum = u;
+        for (z, (weight, radius)) in held.iter_mut().zip(plays) {
+            *z = z.clamp(u - radius, u + radius);
+            sum += weight * (*z - u);
+        }
+        GAIN * sum + noise * random()
+    });
+    let y = y.collect();
+    let channels = vec![Channel { name: "u_V".into(), samples: u }, Channel { name: "y_um".into(), samples: y }];
+    Recording::new(name, Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap()
+}
+
+fn diagnosed(plays: &[(f64, f64)], noise: f64) -> Diagnosis {
+    let simulation = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+    let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
+    let request = Request {
+        simulation: &simulation,
+        file: "test.sim.toml",
+        estimation: &[recording("est.csv", 1, plays, noise)],
+        holdout: &[recording("val.csv", 2, plays, noise)],
+        questions: &[],
+        options: Options::default(),
+    };
+    diagnose(&request, &hooks).unwrap()
+}
+
+/// What a diagnosis tells of its only effect, after what must hold of all: the family, and what is left on the hold-out over the noise.
+fn told(d: &Diagnosis, noise: f64, most: f64) -> &[ParameterRecord] {
+    let families: Vec<&str> = d.file.effects.iter().map(|e| e.family.as_str()).collect();
+    assert_eq!(families, ["actuator_hysteresis"], "{}", d.file.summary);
+    let left = d.file.fit[0].rmse_after.unwrap() / noise;
+    assert!(left < most, "{left} of the noise is left: {}", d.file.summary);
+    &d.file.effects[0].parameters
+}
+
+fn value(parameters: &[ParameterRecord], name: &str) -> f64 {
+    parameters.iter().find(|p| p.name == name).unwrap_or_else(|| panic!("no {name}: {parameters:?}")).value
+}
+
+#[test]
+fn plays_whose_widths_stand_nowhere_in_particular_are_found_with_their_spacing() {
+    // Five plays 3.1 V apart; the input reaches some 30 V.
+    let plays: Vec<(f64, f64)> =
+        (1..=5).zip([0.04, 0.08, 0.03, 0.07, 0.05]).map(|(i, w)| (w, 3.1 * f64::from(i))).collect();
+    let noise = 0.005;
+    let d = diagnosed(&plays, noise);
+    let parameters = told(&d, noise, 1.1);
+    let spacing = value(parameters, "r_s");
+    assert!((spacing / 3.1 - 1.0).abs() < 0.02, "{spacing} V: {parameters:?}");
+    for (i, (weight, _)) in (1..).zip(&plays) {
+        let found = value(parameters, &format!("p_{i}"));
+        assert!((found - weight).abs() < 0.01, "p_{i}: {parameters:?}");
+    }
+    assert!((value(parameters, "share") - 0.27).abs() < 0.01, "{parameters:?}");
+}
+
+#[test]
+fn a_faint_loop_of_a_smooth_density_is_told_by_two_numbers() {
+    // Sixty plays, half of a normal density of 12 V: the noise hides the loop but for its size and width.
+    let weight = |r: f64| 0.004 * (-(r / 12.0).powi(2)).exp();
+    let plays: Vec<(f64, f64)> = (0..60).map(|i| 0.6 * (f64::from(i) + 0.5)).map(|r| (weight(r), r)).collect();
+    let noise = 0.04;
+    let d = diagnosed(&plays, noise);
+    let parameters = told(&d, noise, 1.05);
+    let (width, share) = (value(parameters, "r_d"), value(parameters, "share"));
+    let whole: f64 = plays.iter().map(|p| p.0).sum();
+    assert!((width / 12.0).ln().abs() < 0.5, "{width} V: {parameters:?}");
+    assert!((share / whole).ln().abs() < 0.5, "{share} for {whole}: {parameters:?}");
+}
