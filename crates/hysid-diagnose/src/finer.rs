@@ -15,12 +15,16 @@ use crate::screen::rewrite_at;
 const WORTH_REFINING: f64 = 10.0;
 /// Log evidence that an effect may lack where a form has no more unknowns than it has now.
 const WORTH_RECASTING: f64 = -5.0;
+/// Log evidence that makes an effect plain to see.
+const PLAIN_TO_SEE: f64 = 100.0;
+/// Log evidence within which two forms tie.
+const TIE: f64 = 3.0;
 /// Iterations of a fit that tells from which start a form is fitted.
 const SKETCH: usize = 3;
 /// Most starts of a form.
 const MOST_STARTS: usize = 4;
 
-/// The hypothesis with the law of its `index`-th effect in another form, if there is one that has more evidence: the one with the most.
+/// The hypothesis with the law of its `index`-th effect in another form, if one is better.
 ///
 /// `trunk` is a hypothesis of the first effects of this one, before that effect; those that follow are written into it anew.
 pub fn finer<'d>(
@@ -31,7 +35,7 @@ pub fn finer<'d>(
 ) -> Option<Hypothesis<'d>> {
     let effect = h.effects.get(index)?;
     let now = unknowns(&effect.mechanism.law_at(&effect.slot, effect.written.purpose));
-    let mut best: Option<Hypothesis<'d>> = None;
+    let mut forms: Vec<Hypothesis<'d>> = Vec::new();
     for purpose in effect.mechanism.forms(&effect.slot) {
         let more = unknowns(&effect.mechanism.law_at(&effect.slot, purpose)) > now;
         let worth = if more { WORTH_REFINING } else { WORTH_RECASTING };
@@ -44,14 +48,23 @@ pub fn finer<'d>(
         let Some(other) = written_as(setting, trunk, h, index, purpose) else { continue };
         // Where more unknowns bring nothing, still more of them will not.
         let done = more && other.log_evidence < h.log_evidence;
-        if other.log_evidence > best.as_ref().unwrap_or(h).log_evidence {
-            best = Some(other);
-        }
+        forms.push(other);
         if done {
             break;
         }
     }
-    best
+    let merits: Vec<(f64, f64)> =
+        std::iter::once(h).chain(&forms).map(|f| (f.log_evidence, f.base.log_likelihood)).collect();
+    let chosen = preferred(&merits, h.log_evidence - trunk.log_evidence > PLAIN_TO_SEE)?;
+    chosen.checked_sub(1).map(|i| forms.swap_remove(i))
+}
+
+/// The form to be taken, of their evidences and log likelihoods: the one with the most evidence. Where an effect is plain to see, of those that
+/// tie the one that leaves the least: they say the same, and what a smooth curve leaves of an angular one would pass for another effect.
+fn preferred(merits: &[(f64, f64)], plain: bool) -> Option<usize> {
+    let top = merits.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
+    let tie = if plain { TIE } else { 0.0 };
+    (0..merits.len()).filter(|&i| merits[i].0 >= top - tie).max_by(|&a, &b| merits[a].1.total_cmp(&merits[b].1))
 }
 
 /// What a law asks of the recording.
@@ -148,6 +161,17 @@ fn spread(old: &[Named], new: &[String]) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_forms_that_tie_the_one_that_leaves_the_least_is_taken() {
+        let check = |merits: &[(f64, f64)], plain, expected| assert_eq!(preferred(merits, plain), Some(expected));
+        // Evidence and log likelihood of three plays, a density and six plays.
+        let near = [(300.0, 315.0), (345.8, 357.0), (345.2, 371.0)];
+        check(&near, true, 2);
+        check(&near, false, 1);
+        check(&[(300.0, 315.0), (345.8, 357.0), (341.0, 371.0)], true, 1);
+        check(&[(8.0, 15.0), (7.9, 15.5)], false, 0);
+    }
 
     #[test]
     fn weights_are_spread_over_the_terms_in_their_place() {
