@@ -1,6 +1,6 @@
 //! Flow separation that lags behind the angle of attack.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, log_grid};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
 /// Where the simulation has the separation as a function of the angle (Kirchhoff's steady curve), that function lags. While it follows
@@ -10,14 +10,14 @@ fn lagging(purpose: Purpose) -> Law {
     let rate = |law: Law, times: Vec<f64>| law.shape("tau_2", after, Grid::Values(times)).within(0.0, 10.0);
     let law = match purpose {
         Purpose::Screening => Law::separation("x - tau_2*v", "steady + w*(lag(ahead, tau_1) - steady)").weight(),
-        Purpose::Refit => Law::separation("x", "lag(ahead, tau_1)"),
-        Purpose::Finer => Law::separation("x - tau_2*v", "lag(ahead, tau_1)"),
+        Purpose::Form(Form::Finer) => Law::separation("x - tau_2*v", "lag(ahead, tau_1)"),
+        Purpose::Refit | Purpose::Form(_) => Law::separation("x", "lag(ahead, tau_1)"),
     };
     let law = law.shape("tau_1", after, log_grid(0.02, 1.0, 4)).within(1e-6, 10.0);
     match purpose {
         Purpose::Screening => rate(law, vec![0.0, 0.1, 0.5]),
-        Purpose::Refit => law,
-        Purpose::Finer => rate(law, vec![0.02]),
+        Purpose::Form(Form::Finer) => rate(law, vec![0.02]),
+        Purpose::Refit | Purpose::Form(_) => law,
     }
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::mechanism::Form;
 use crate::slot::Place;
 
 #[test]
@@ -147,7 +148,7 @@ fn separation_lags_where_the_simulation_has_it() {
     let at = |angle: &str| format!("1/(1 + exp(s*({angle} - a_s)))");
     let (steady, ahead) = (at("alpha"), at("alpha - tau_2*d(alpha)"));
     check(Purpose::Refit, &format!("lag({steady}, tau_1)"));
-    check(Purpose::Finer, &format!("lag({ahead}, tau_1)"));
+    check(Purpose::Form(Form::Finer), &format!("lag({ahead}, tau_1)"));
     check(Purpose::Screening, &format!("{steady} + w*(lag({ahead}, tau_1) - {steady})"));
 }
 
