@@ -78,7 +78,7 @@ impl Left {
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
-    /// evidence. `None` where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool).
+    /// evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool).
     pub fn modelled<'d>(
         &self,
         search: &Search<'_, 'd>,
@@ -86,6 +86,10 @@ impl Left {
         winner: usize,
         otherwise: usize,
     ) -> Option<Hypothesis<'d>> {
+        // Where a parameter walks, another recording sees another walk: functions of the time that follow this one are no use there.
+        if self.told().is_some_and(|o| o.words.is_some() && o.written.is_none()) {
+            return None;
+        }
         let setting = search.setting;
         let instead = if winner > 0 { search.open(&pool[0]) } else { None };
         let best = [(winner, self.open.as_ref()), (0, instead.as_ref())]
@@ -103,6 +107,11 @@ impl Left {
         (better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
     }
 
+    /// The correction that is told: in place of the set, or of what it leaves.
+    fn told(&self) -> Option<&OpenSet> {
+        self.instead.as_ref().or(self.open.as_ref())
+    }
+
     /// Whether a correction is beyond doubt: on blocks that it was not fitted to, or by evidence that noise has nowhere. A mismatch far below the
     /// noise never shows on blocks.
     fn stands(&self, open: &OpenSet) -> bool {
@@ -112,7 +121,7 @@ impl Left {
     /// The correction, where it models something that is left and helps where it was not fitted, with what it says in words.
     pub fn believed(self) -> Option<(CorrectionRecord, Option<String>)> {
         let wanted = self.imperfect || self.test.is_none();
-        let open = self.instead.as_ref().or(self.open.as_ref()).filter(|o| wanted && self.stands(o))?;
+        let open = self.told().filter(|o| wanted && self.stands(o))?;
         Some((CorrectionRecord { ratio: finite(open.block_ratio), ..open.record.clone() }, open.words.clone()))
     }
 }
