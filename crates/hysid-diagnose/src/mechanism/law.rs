@@ -236,6 +236,16 @@ impl Law {
         self.with(name.into(), measure.into(), Role::Constant(grid))
     }
 
+    /// A shape parameter that only sharp recordings tell: at the first of these multiples of its measure until the finer form has it fitted,
+    /// so that no recording pays for what it cannot tell.
+    #[must_use]
+    pub fn detail(self, purpose: Purpose, name: &str, measure: &str, values: Vec<f64>, range: (f64, f64)) -> Self {
+        match purpose {
+            Purpose::Finer => self.shape(name, measure, Grid::Values(values)).within(range.0, range.1),
+            Purpose::Screening | Purpose::Refit => self.constant(name, measure, Grid::Values(values)),
+        }
+    }
+
     fn with(mut self, name: String, measure: String, role: Role) -> Self {
         self.parameters.push(LawParameter {
             name,

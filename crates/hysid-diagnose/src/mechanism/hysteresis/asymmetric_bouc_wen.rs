@@ -11,17 +11,15 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
     already: &[],
-    law: |_, _| {
+    law: |_, purpose| {
         // The share a makes z tend to 1/(1 + 2 a)^(1/n) upwards and to 1/(1 - 2 a)^(1/n) downwards.
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 3.0, 4))
             .within(0.02, 20.0)
             .at_least(0.2, "v*h")
-            .shape("b", "1", Grid::Values(vec![0.5]))
-            .within(0.3, 5.0)
-            .shape("n_z", "1", Grid::Values(vec![1.0]))
-            .within(1.0, 6.0)
+            .detail(purpose, "b", "1", vec![0.5], (0.3, 5.0))
+            .detail(purpose, "n_z", "1", vec![1.0], (1.0, 6.0))
             .shape("a_z", "1", Grid::Values(vec![-0.15, 0.15]))
             .within(-0.45, 0.45)
             .relaxing("z", "v - abs(z)^(n_z - 1)*(b*abs(v)*z + (1 - b)*v*abs(z) + a_z*(v*z + abs(v)*abs(z)))", "x_y")

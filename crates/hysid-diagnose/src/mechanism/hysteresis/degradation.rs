@@ -11,7 +11,7 @@ pub static DEGRADATION: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
     already: &[],
-    law: |_, _| {
+    law: |_, purpose| {
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
@@ -19,12 +19,9 @@ pub static DEGRADATION: Mechanism = Mechanism {
             .at_least(0.2, "v*h")
             .shape("d_A", "x/(v*T)", Grid::Values(vec![0.5]))
             .within(0.0, 20.0)
-            .shape("d_nu", "x/(v*T)", Grid::Values(vec![0.5]))
-            .within(0.0, 20.0)
-            .shape("d_eta", "x/(v*T)", Grid::Values(vec![0.5]))
-            .within(0.0, 20.0)
-            .shape("b", "1", Grid::Values(vec![0.5]))
-            .within(0.3, 5.0)
+            .detail(purpose, "d_nu", "x/(v*T)", vec![0.0, 0.5], (0.0, 20.0))
+            .detail(purpose, "d_eta", "x/(v*T)", vec![0.0, 0.5], (0.0, 20.0))
+            .detail(purpose, "b", "1", vec![0.5], (0.3, 5.0))
             .relaxing("z", "max(1 - d_A*e, 0.05)*v - (1 + d_nu*e)*(b*abs(v)*z + (1 - b)*v*abs(z))", "(1 + d_eta*e)*x_y")
             .state("e", "1", "max(z*v, 0)/x_y")
             .report("k_h", "F/x", "F_h/x_y")

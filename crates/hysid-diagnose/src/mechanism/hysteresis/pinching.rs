@@ -11,7 +11,7 @@ pub static PINCHING: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
     already: &[],
-    law: |_, _| {
+    law: |_, purpose| {
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
@@ -19,12 +19,9 @@ pub static PINCHING: Mechanism = Mechanism {
             .at_least(0.2, "v*h")
             .shape("zeta_1", "1", Grid::Values(vec![0.6]))
             .within(0.0, 0.97)
-            .shape("zeta_2", "1", Grid::Values(vec![0.2, 0.5]))
-            .within(0.02, 2.0)
-            .shape("q_z", "1", Grid::Values(vec![0.1]))
-            .within(-0.5, 0.9)
-            .shape("b", "1", Grid::Values(vec![0.5]))
-            .within(0.3, 5.0)
+            .detail(purpose, "zeta_2", "1", vec![0.3, 0.5], (0.02, 2.0))
+            .detail(purpose, "q_z", "1", vec![0.1], (-0.5, 0.9))
+            .detail(purpose, "b", "1", vec![0.5], (0.3, 5.0))
             .relaxing("z", "(1 - zeta_1*exp(-((z*sign(v) - q_z)/zeta_2)^2))*(v - b*abs(v)*z - (1 - b)*v*abs(z))", "x_y")
             .report("k_h", "F/x", "F_h/x_y")
     },
