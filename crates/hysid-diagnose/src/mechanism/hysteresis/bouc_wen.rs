@@ -1,6 +1,6 @@
 //! A spring with a smooth rate-independent loop.
 
-use crate::mechanism::{Block, Family, Law, Mechanism, Need, log_grid};
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_grid};
 use crate::slot::Place;
 
 /// A spring with a smooth rate-independent loop.
@@ -18,7 +18,8 @@ pub static BOUC_WEN: Mechanism = Mechanism {
             .shape("x_y", "x", log_grid(0.1, 3.0, 5))
             .within(0.02, 20.0)
             .at_least(0.2, "v*h")
-            .detail(purpose, "b", "1", vec![0.5], (0.3, 5.0))
+            .shape("b", "1", Grid::Values(vec![0.5]))
+            .within(0.3, 5.0)
             .detail(purpose, "n_z", "1", vec![1.0, 2.0], (1.0, 6.0))
             .relaxing("z", "v - abs(z)^(n_z - 1)*(b*abs(v)*z + (1 - b)*v*abs(z))", "x_y")
             .report("k_h", "F/x", "F_h/x_y")
