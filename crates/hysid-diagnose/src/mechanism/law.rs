@@ -241,8 +241,8 @@ impl Law {
     #[must_use]
     pub fn detail(self, purpose: Purpose, name: &str, measure: &str, values: Vec<f64>, range: (f64, f64)) -> Self {
         match purpose {
-            Purpose::Finer => self.shape(name, measure, Grid::Values(values)).within(range.0, range.1),
-            Purpose::Screening | Purpose::Refit => self.constant(name, measure, Grid::Values(values)),
+            Purpose::Form(Form::Finer) => self.shape(name, measure, Grid::Values(values)).within(range.0, range.1),
+            _ => self.constant(name, measure, Grid::Values(values)),
         }
     }
 
