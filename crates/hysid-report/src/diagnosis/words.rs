@@ -57,6 +57,9 @@ pub(super) fn next_step(file: &DiagnosisFile) -> &'static str {
         VerdictKind::Ambiguous => {
             "Do not build any of these into the simulation yet. Record again in the way proposed here, where there is a proposal, and diagnose both recordings together."
         }
+        VerdictKind::NotInCatalogue if file.fit.iter().all(|f| f.ratio.is_none()) => {
+            "Look for physics at the place named below. No simulation is written: nothing that was found can be trusted on another recording."
+        }
         VerdictKind::NotInCatalogue => {
             "Look for physics at the place named below. The correction predicts better than the simulation alone, but do not use it outside the range of the recordings."
         }
