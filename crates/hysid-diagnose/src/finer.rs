@@ -34,10 +34,11 @@ pub fn finer<'d>(
     index: usize,
 ) -> Option<Hypothesis<'d>> {
     let effect = h.effects.get(index)?;
-    let now = unknowns(&effect.mechanism.law_at(&effect.slot, effect.written.purpose));
+    let present = effect.mechanism.law_at(&effect.slot, effect.written.purpose);
+    let now = unknowns(&present);
     let mut forms: Vec<Hypothesis<'d>> = Vec::new();
-    for purpose in effect.mechanism.forms(&effect.slot) {
-        let more = unknowns(&effect.mechanism.law_at(&effect.slot, purpose)) > now;
+    for (purpose, law) in effect.mechanism.forms(&effect.slot) {
+        let more = unknowns(&law) > now;
         let worth = if more { WORTH_REFINING } else { WORTH_RECASTING };
         if purpose == effect.written.purpose || h.log_evidence < trunk.log_evidence + worth {
             continue;
@@ -45,7 +46,7 @@ pub fn finer<'d>(
         if setting.budget.omits(Step::Fits) {
             break;
         }
-        let Some(other) = written_as(setting, trunk, h, index, purpose) else { continue };
+        let Some(other) = written_as(setting, trunk, h, index, &present, (purpose, &law)) else { continue };
         // Where more unknowns bring nothing, still more of them will not.
         let done = more && other.log_evidence < h.log_evidence;
         forms.push(other);
@@ -78,7 +79,8 @@ fn written_as<'d>(
     trunk: &Hypothesis<'_>,
     h: &Hypothesis<'d>,
     index: usize,
-    purpose: Purpose,
+    present: &Law,
+    (purpose, law): (Purpose, &Law),
 ) -> Option<Hypothesis<'d>> {
     let first = trunk.effects.len();
     let values = h.base.values();
@@ -86,8 +88,8 @@ fn written_as<'d>(
     let (slot, mechanism) = (&effect.slot, effect.mechanism);
     let (written, _) =
         rewrite_at(&trunk.base, &trunk.base.document(), &setting.original, mechanism, &slot.label, purpose)?;
-    let old = named(&mechanism.law_at(slot, effect.written.purpose), effect, &values);
-    let names = Names::of(&mechanism.law_at(slot, purpose));
+    let old = named(present, effect, &values);
+    let names = Names::of(law);
     // What the present form says too is kept; the rest starts at the points of its grid.
     let kept = |name: &String| old.1.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
     let mut starts: Vec<Vec<Option<f64>>> = Vec::new();

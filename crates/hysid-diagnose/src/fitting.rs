@@ -3,6 +3,7 @@
 //! A few iterations tell who is hopeless; the others are fitted from several starts. Shapes that least squares cannot move (a time, a period,
 //! a knee) are searched line by line with the other unknowns refitted.
 
+use hysid_plant::Simulation;
 use rayon::prelude::*;
 
 use crate::base::Base;
@@ -72,6 +73,13 @@ fn sketch<'d>(
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
+/// Sets a start value of a parameter that the document has, within its bounds.
+fn set(values: &mut Values, document: &Simulation, name: &str, x: f64) {
+    if let Some(p) = document.parameter(name) {
+        values.parameters.insert(name.to_owned(), x.clamp(p.lower(), p.upper()));
+    }
+}
+
 /// The parent's values with each of the candidate's starts; the last one has the simulation's parameters as the user gave them where the
 /// parent has no effect yet, and the one before it comes from a global calibration where the parent is far off and the law has no amplitude.
 fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
@@ -80,11 +88,7 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
         with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
     let with = |values: &Values, start: Vec<(String, f64)>| {
         let mut from = values.clone();
-        for (name, x) in start {
-            if let Some(p) = document.parameter(&name) {
-                from.parameters.insert(name, x.clamp(p.lower(), p.upper()));
-            }
-        }
+        start.iter().for_each(|(name, x)| set(&mut from, document, name, *x));
         from
     };
     let starts = starts(candidate);
@@ -354,8 +358,8 @@ pub fn assemble<'d>(
             rewrite_at(&trunk.base, &document, &setting.original, part.mechanism, &part.slot, part.purpose)?;
         values = with_added_starts(&values, &written, &slot, setting.data.stretches.len());
         for (name, x) in written.parameters_of().iter().zip(&part.values) {
-            if let (Some(x), Some(p)) = (x, written.simulation.parameter(name)) {
-                values.parameters.insert(name.clone(), x.clamp(p.lower(), p.upper()));
+            if let Some(x) = x {
+                set(&mut values, &written.simulation, name, *x);
             }
         }
         document = written.simulation.clone();

@@ -1,5 +1,7 @@
 //! Whole diagnoses of an oscillator whose recordings come from a small integrator of the tests' own, and bad input.
 
+#[path = "diagnose/actuator.rs"]
+mod actuator;
 #[path = "common/oscillator.rs"]
 mod oscillator;
 

@@ -28,7 +28,6 @@ pub struct Wander {
     values: Vec<f64>,
     /// The residual along the eigenvectors.
     along: Vec<f64>,
-    vectors: DMatrix<f64>,
 }
 
 impl Wander {
@@ -40,11 +39,7 @@ impl Wander {
         let right = DVector::from_iterator(k, columns.iter().map(|c| share * dot(c, r)));
         let eigen = SymmetricEigen::new(gram);
         let along = eigen.eigenvectors.transpose() * right;
-        Self {
-            values: eigen.eigenvalues.iter().map(|v| v.max(0.0)).collect(),
-            along: along.iter().copied().collect(),
-            vectors: eigen.eigenvectors,
-        }
+        Self { values: eigen.eigenvalues.iter().map(|v| v.max(0.0)).collect(), along: along.iter().copied().collect() }
     }
 
     /// Log evidence of amplitudes of this scale over that of none.
@@ -66,14 +61,6 @@ impl Wander {
         let (top, scale) = gains.iter().copied().fold((f64::NEG_INFINITY, 0.0), |a, b| if b.0 > a.0 { b } else { a });
         let mean = gains.iter().map(|(g, _)| (g - top).exp()).sum::<f64>() / gains.len() as f64;
         (top + mean.ln(), scale)
-    }
-
-    /// The likeliest amplitudes at this scale, of the columns.
-    pub fn amplitudes(&self, scale: f64) -> Vec<f64> {
-        let t = scale * scale;
-        let each = self.values.iter().zip(&self.along).map(|(v, a)| t * a / (1.0 + t * v));
-        let out = &self.vectors * DVector::from_iterator(self.values.len(), each);
-        out.iter().copied().collect()
     }
 }
 
@@ -212,7 +199,11 @@ mod tests {
         let w = Wander::new(&f, &r, 1.0);
         let (gain, likeliest) = w.mean_gain();
         assert!(gain > 50.0 && likeliest > 0.5 * scale && likeliest < 2.0 * scale, "{gain} {likeliest}");
-        let found = w.amplitudes(likeliest);
+        // The likeliest amplitudes at that scale, from the normal equations.
+        let precision = 1.0 / (likeliest * likeliest);
+        let normal = DMatrix::from_fn(12, 12, |a, b| dot(&f[a], &f[b]) + if a == b { precision } else { 0.0 });
+        let right = DVector::from_iterator(12, f.iter().map(|c| dot(c, &r)));
+        let found = normal.cholesky().unwrap().solve(&right);
         assert!((found[0] - amplitudes[0]).abs() < 0.2 * scale, "{found:?} {amplitudes:?}");
     }
 

@@ -98,7 +98,7 @@ pub fn check_form(
             what,
         });
     };
-    for purpose in std::iter::once(Purpose::Screening).chain(mechanism.forms(slot)) {
+    for purpose in std::iter::once(Purpose::Screening).chain(mechanism.forms(slot).into_iter().map(|(form, _)| form)) {
         let written = match mechanism.rewrite(simulation, slot, signals, purpose) {
             Ok(written) => written,
             Err(e) => {

@@ -128,8 +128,8 @@ impl Mechanism {
         if slot.has("control") && self.family.follows_control() { law.controlled() } else { law }
     }
 
-    /// What the law at a slot can be fitted as, the plain form first; forms that it has not got are left out.
-    pub fn forms(&self, slot: &Slot) -> Vec<Purpose> {
+    /// What the law at a slot can be fitted as, with the law in that form, the plain one first; forms that it has not got are left out.
+    pub fn forms(&self, slot: &Slot) -> Vec<(Purpose, Law)> {
         let mut known: Vec<(Purpose, Law)> = Vec::new();
         for purpose in Purpose::FITTED {
             let law = self.law_at(slot, purpose);
@@ -137,7 +137,7 @@ impl Mechanism {
                 known.push((purpose, law));
             }
         }
-        known.into_iter().map(|(purpose, _)| purpose).collect()
+        known
     }
 
     /// What the recording lacks for this mechanism to be seen at the slot, in words; `None` when nothing is lacking.

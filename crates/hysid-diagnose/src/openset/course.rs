@@ -28,6 +28,11 @@ impl Course {
     }
 }
 
+/// The two phases of an oscillation of this angular frequency, as they are written.
+pub fn phases(frequency: &str) -> [String; 2] {
+    ["sin", "cos"].map(|phase| format!("{phase}({frequency}*t)"))
+}
+
 /// Samples of a signal by stretch.
 pub type Series = Vec<Vec<f64>>;
 
@@ -83,10 +88,7 @@ impl Time {
                     format!("{:.6}*sin({:.8}*(t - {}))", SQRT_2 / w, w / self.length, self.start)
                 })
                 .collect(),
-            Course::Line(f) => {
-                let w = TAU * f;
-                vec![format!("sin({w:.8}*t)"), format!("cos({w:.8}*t)")]
-            }
+            Course::Line(f) => phases(&format!("{:.8}", TAU * f)).to_vec(),
         }
     }
 

@@ -45,8 +45,8 @@ pub fn multiply(simulation: &mut Simulation, symbol: &str, factor: &Expr) {
 pub struct Modulated<'d> {
     model: Model<'d>,
     theta: Vec<f64>,
-    /// Inputs that the simulation itself has.
-    own: usize,
+    /// The place among the inputs of each modulation.
+    places: Vec<usize>,
 }
 
 impl<'d> Modulated<'d> {
@@ -54,6 +54,7 @@ impl<'d> Modulated<'d> {
     pub fn new(base: &Base<'_>, symbols: &[String], data: &'d DataSet) -> Option<Self> {
         let mut document = base.document();
         let own = document.inputs.len();
+        let places = (own..own + symbols.len()).collect();
         for symbol in symbols {
             let name = document.fresh_symbol("modulation");
             document.inputs.push(Input { symbol: name.clone(), column: name.clone() });
@@ -62,7 +63,7 @@ impl<'d> Modulated<'d> {
         let states: Vec<String> = document.states.iter().map(|s| s.name.clone()).collect();
         let model = Model::new(&document, data, &states, base.model.substeps()).ok()?;
         let theta = model.theta(&base.values());
-        Some(Self { model, theta, own })
+        Some(Self { model, theta, places })
     }
 
     /// Whether each modulation acts on something that moves. An offset that varies is an unknown force or a drift of the sensor, which noise is too.
@@ -72,8 +73,9 @@ impl<'d> Modulated<'d> {
         let column = |p: &hysid_plant::Linearisation, i: usize| -> Vec<f64> {
             p.b.chunks(inputs).chain(p.d.chunks(inputs)).filter_map(|row| row.get(i).copied()).collect()
         };
-        (self.own..inputs)
-            .map(|i| {
+        self.places
+            .iter()
+            .map(|&i| {
                 let all: Vec<Vec<f64>> = points.iter().map(|p| column(p, i)).collect();
                 let size = all.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
                 let moved = |x: &Vec<f64>| x.iter().zip(&all[0]).any(|(a, b)| (a - b).abs() > CONSTANT * size);
@@ -82,13 +84,21 @@ impl<'d> Modulated<'d> {
             .collect()
     }
 
+    /// Forgets the modulations of what does not move, and returns the symbols of those that are left.
+    pub fn keep_of_motion(&mut self, symbols: Vec<String>) -> Vec<String> {
+        let moving = self.of_motion();
+        let mut each = moving.iter();
+        self.places.retain(|_| each.next() == Some(&true));
+        symbols.into_iter().zip(moving).filter(|(_, moving)| *moving).map(|(s, _)| s).collect()
+    }
+
     /// The stacked response to each modulation (number of the symbol, series by stretch), for an amplitude of one.
     pub fn responses(&self, modulations: &[(usize, Vec<Vec<f64>>)]) -> Vec<Option<Vec<f64>>> {
         modulations
             .par_chunks(TOGETHER)
             .flat_map_iter(|some| {
                 let signals: Vec<_> =
-                    some.iter().map(|(i, series)| (Place::Input(self.own + i), series.as_slice())).collect();
+                    some.iter().map(|(i, series)| (Place::Input(self.places[*i]), series.as_slice())).collect();
                 self.model.responses_to(&self.theta, &signals)
             })
             .collect()
@@ -104,8 +114,8 @@ impl<'d> Modulated<'d> {
             out
         };
         let weights: Vec<Vec<f64>> = residuals.iter().map(|r| reversed(&noise.apply(layout, &reversed(r)))).collect();
-        let mut all = self.model.by_inputs(&self.theta, &weights)?;
-        all.iter_mut().for_each(|by| *by = by.split_off(self.own.min(by.len())));
-        Some(all)
+        let all = self.model.by_inputs(&self.theta, &weights)?;
+        let of_places = |mut by: Vec<Vec<Vec<f64>>>| self.places.iter().map(|&i| std::mem::take(&mut by[i])).collect();
+        Some(all.into_iter().map(of_places).collect())
     }
 }

@@ -127,10 +127,11 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<
     let all = modulated(base);
     let time = Time::of(base)?;
     let data = base.model.data().with_still_inputs(all.len());
-    let moving = Modulated::new(base, &all, &data)?.of_motion();
-    let symbols: Vec<String> = all.into_iter().zip(moving).filter(|(_, moving)| *moving).map(|(s, _)| s).collect();
-    let data = base.model.data().with_still_inputs(symbols.len());
-    let machine = Modulated::new(base, &symbols, &data).filter(|_| !symbols.is_empty())?;
+    let mut machine = Modulated::new(base, &all, &data)?;
+    let symbols = machine.keep_of_motion(all);
+    if symbols.is_empty() {
+        return None;
+    }
     let courses = time.courses(Course::Walk(1.0));
     let requests: Vec<(usize, Series)> =
         (0..symbols.len()).flat_map(|i| courses.iter().map(move |w| (i, w.clone()))).collect();

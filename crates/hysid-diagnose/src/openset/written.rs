@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use hysid_plant::{Expr, Parameter, Simulation, Slot as Place};
 
-use super::course::Course;
+use super::course::{Course, phases};
 use super::modulation::multiply;
 use super::terms::Term;
 use super::varying::Varying;
@@ -63,11 +63,8 @@ pub fn with_oscillation(simulation: &Simulation, found: &Varying) -> Option<Simu
     let (w, far) = (TAU * f, TAU * CYCLES / found.length_s);
     written.parameters.push(Parameter::new(&frequency, w).within(w - far, w + far));
     let mut factor = Expr::Number(1.0);
-    for (text, amplitude) in found.texts.iter().zip(&found.amplitudes) {
-        let course = Expr::parse(text).ok()?.map(&mut |e| match e {
-            Expr::Number(_) => Expr::symbol(&frequency),
-            other => other,
-        });
+    for (text, amplitude) in phases(&frequency).iter().zip(&found.amplitudes) {
+        let course = Expr::parse(text).ok()?;
         let name = written.fresh_symbol("g");
         let reach = REACH * found.size;
         written.parameters.push(Parameter::new(&name, *amplitude).within(-reach, reach));

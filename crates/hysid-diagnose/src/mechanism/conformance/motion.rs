@@ -118,7 +118,9 @@ impl Bench {
     pub fn check_motion(&self, mechanism: &'static Mechanism, slot: &Slot, signals: &Signals) -> Vec<Breach> {
         let mut breaches = Vec::new();
         let mut breach = |what: String| breaches.push(self.breach(mechanism, slot, what));
-        for purpose in std::iter::once(Purpose::Screening).chain(mechanism.forms(slot)) {
+        for purpose in
+            std::iter::once(Purpose::Screening).chain(mechanism.forms(slot).into_iter().map(|(form, _)| form))
+        {
             let Ok(written) = mechanism.rewrite(&self.simulation, slot, signals, purpose) else { continue };
             if !written.neutral.is_empty() {
                 match outputs(&with(&written.simulation, &written.neutral), &self.drive) {
