@@ -4,6 +4,7 @@
 
 use std::f64::consts::TAU;
 
+pub mod limits;
 pub mod timing;
 
 /// The terms of the known system: coefficient, and the term as the comparison with other tools writes it.

@@ -7,6 +7,7 @@
 mod case;
 mod diagnosis;
 mod guard;
+mod limits;
 mod measure;
 mod page;
 mod selection;
@@ -40,6 +41,9 @@ pub struct Args {
     /// Cost against the sizes of a selection instead: figures in `docs/figures` and slopes.
     #[arg(long, conflicts_with_all = ["peers", "cases", "guard"])]
     plots: bool,
+    /// What the machine can do at most, one thread and two: multiply-adds and memory traffic.
+    #[arg(long, conflicts_with_all = ["peers", "cases", "guard", "plots"])]
+    limits: bool,
     /// Count instructions of four kernels (valgrind) and fail on more than 10 % above the stored numbers.
     #[arg(long)]
     guard: bool,
@@ -87,6 +91,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
         Ok(())
     };
+    if args.limits {
+        return renew("limits", &limits::run(&shell, &root, rounds)?);
+    }
     if args.plots {
         return renew("slopes", &slopes::run(&shell, &root, rounds)?);
     }

@@ -7,6 +7,7 @@ use std::error::Error;
 use std::hint::black_box;
 use std::path::Path;
 
+use hysid_bench::limits::{Limits, measure};
 use hysid_bench::timing::{list, read_doubles, repeat, report, thread_seconds, write_doubles};
 use hysid_bench::{dictionary, known_system};
 use hysid_dictionary::{Design, Record};
@@ -18,7 +19,8 @@ const USAGE: &str = "timed input random|modulated|force SAMPLES OUT
 timed staircase|grid CELLS SAMPLES REPS IN OUT
 timed bouc-wen SAMPLES REPS IN OUT D A B G PERIOD
 timed simulate one|batch STEPS SAMPLES REPS MODEL IN OUT
-timed scaling ROUNDS";
+timed scaling ROUNDS
+timed limits THREADS ROUNDS";
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -54,6 +56,10 @@ fn run(words: &[&str]) -> Result<String, Box<dyn Error>> {
             simulate(form, steps.parse()?, Path::new(model), u, reps.parse()?, Path::new(to))
         }
         ["scaling", rounds] => scaling(rounds.parse()?),
+        ["limits", threads, rounds] => {
+            let Limits { gflops, gigabytes } = measure(threads.parse()?, rounds.parse()?);
+            Ok(format!("{{\"gflops\": {gflops:.1}, \"gigabytes\": {gigabytes:.1}}}"))
+        }
         _ => Err("unknown words".into()),
     }
 }
