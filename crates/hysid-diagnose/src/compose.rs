@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
+use crate::assemble::{Part, assemble, complete, without};
 use crate::budget::Step;
 use crate::finer::finer;
-use crate::fitting::{HOPELESS, Part, assemble, complete, refit_all, without};
+use crate::fitting::{HOPELESS, refit_all};
 use crate::hypothesis::{Effect, Hypothesis, Key, Setting};
 use crate::joint::pairs;
 use crate::mechanism::Mechanism;
@@ -72,6 +73,23 @@ pub fn unheard<'c>(pool: &[Hypothesis<'_>], candidates: &'c [Candidate], given: 
         given.contains(&key) || pool.iter().any(|h| h.key() == key && h.log_evidence > best.log_evidence - HOPELESS)
     };
     rivals_of(&best.effects[0], candidates).into_iter().filter(|c| !heard(c)).take(SECOND_HEARING).collect()
+}
+
+/// Candidates whose law contains that of the best single effect of a pool, at its slot, and which do not follow the recording as well although
+/// they can: their fit came to rest somewhere else, or was given up. With them that effect, by its place in the pool.
+pub fn outdone_by_a_special_case<'c>(
+    pool: &[Hypothesis<'_>],
+    candidates: &'c [Candidate],
+) -> Option<(usize, Vec<&'c Candidate>)> {
+    let best = (0..pool.len())
+        .filter(|&i| pool[i].effects.len() == 1)
+        .max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence))?;
+    let (special, reached) = (&pool[best].effects[0], pool[best].base.log_likelihood);
+    let follows = |c: &Candidate| pool.iter().any(|h| h.key() == c.key() && h.base.log_likelihood >= reached - 1e-3);
+    let wider = candidates.iter().filter(|c| {
+        c.mechanism.contains.contains(&special.mechanism.id) && c.slot.label == special.slot.label && !follows(c)
+    });
+    Some((best, wider.collect()))
 }
 
 /// How a search is bounded.

@@ -4,8 +4,9 @@
 //! follows a smooth one at a lower price and beyond what the recording reached; six weights follow one that stands far above the noise, where
 //! what three leave would pass for another effect. The evidence decides, so that no recording pays for terms that it cannot tell.
 
+use crate::assemble::{Part, assemble};
 use crate::budget::Step;
-use crate::fitting::{Part, assemble, finish};
+use crate::fitting::finish;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
 use crate::mechanism::{Law, Purpose, Role};
 use crate::model::Values;

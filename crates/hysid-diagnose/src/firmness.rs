@@ -1,6 +1,7 @@
 //! How firmly the members of the winning set are named: their support among all sets that were fitted, less what speaks against trusting it.
 
 use crate::hypothesis::Hypothesis;
+use crate::mechanism::Family;
 use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights};
 
@@ -65,10 +66,24 @@ fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let best = &pool[winner];
     let Some(twin) = best.effects[member].mechanism.family.twin() else { return false };
     let rest = best.key_without(member);
+    let unseen = passes_between_samples(best, member);
     pool.iter().any(|h| {
         let of_twin = h.effects.iter().position(|e| e.mechanism.family == twin);
-        h.effects.len() == best.effects.len()
-            && of_twin.is_some_and(|place| h.key_without(place) == rest)
-            && h.base.log_likelihood > best.base.log_likelihood - REFUTED
+        of_twin.is_some_and(|place| {
+            let as_well = h.effects.len() == best.effects.len()
+                && h.key_without(place) == rest
+                && h.base.log_likelihood > best.base.log_likelihood - REFUTED;
+            unseen || as_well
+        })
     })
+}
+
+/// Whether a member is a lag shorter than a sample: its transient passes between the samples, where a delay, a lag of a sensor and that of a
+/// winding are all the same shift in time, and what is left to tell them apart is how the recording began.
+fn passes_between_samples(h: &Hypothesis<'_>, member: usize) -> bool {
+    let effect = &h.effects[member];
+    let values = h.base.values();
+    effect.mechanism.family == Family::SignalPathLag
+        && (effect.written.shapes.iter().filter_map(|shape| values.parameters.get(&shape.name)))
+            .all(|tau| *tau < h.base.model.data().period_s)
 }

@@ -9,19 +9,17 @@ use rayon::prelude::*;
 use crate::base::Base;
 use crate::budget::Step;
 use crate::calibrate::calibrated_copy;
-use crate::evidence::Whitener;
 use crate::finer::finer;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
-use crate::mechanism::{Mechanism, Purpose};
 use crate::model::Values;
-use crate::screen::{Candidate, rewrite_at, with_added_starts};
+use crate::screen::{Candidate, with_added_starts};
 use crate::unfold::calibrated_unfolded;
 
 /// Points of a shape grid that a refit starts from.
 const MOST_POINTS: usize = 3;
 
 /// Starts of a refit: the best points of the grid that are no neighbours of each other, and the gentlest.
-fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
+pub fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
     let named = |point: &crate::screen::Point| -> Vec<(String, f64)> {
         let mut values = point.shapes.clone();
         for (name, amplitude) in &point.amplitudes {
@@ -74,7 +72,7 @@ fn sketch<'d>(
 }
 
 /// Sets a start value of a parameter that the document has, within its bounds.
-fn set(values: &mut Values, document: &Simulation, name: &str, x: f64) {
+pub fn set(values: &mut Values, document: &Simulation, name: &str, x: f64) {
     if let Some(p) = document.parameter(name) {
         values.parameters.insert(name.to_owned(), x.clamp(p.lower(), p.upper()));
     }
@@ -122,6 +120,32 @@ fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &C
 /// Refits one candidate on top of a hypothesis' simulation.
 pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
     refit_from(setting, parent, candidate, starting_values(setting, parent, candidate), None)
+}
+
+/// Refits a candidate whose law contains that of `special`, from where that one came to rest.
+///
+/// What both laws name alike, and their shapes in order, begin at its values; amplitudes that only the wider law has begin at zero.
+pub fn refit_wider<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    wider: &Candidate,
+    special: &Hypothesis<'_>,
+) -> Option<Hypothesis<'d>> {
+    let values = special.base.values();
+    let effect = special.effects.last()?;
+    let start = starts(wider).into_iter().next()?;
+    let found = |name: &str| values.parameters.get(name).copied();
+    let shape = |name: &str| {
+        let place = wider.refit.shapes.iter().position(|s| s.name == name)?;
+        found(&effect.written.shapes.get(place)?.name)
+    };
+    let amplitude = |name: &str| wider.refit.amplitudes.iter().any(|a| a.name == name).then_some(0.0);
+    let mut from = with_added_starts(&values, &wider.refit, &wider.slot, setting.data.stretches.len());
+    for (name, x) in start {
+        let x = found(&name).or_else(|| shape(&name)).or_else(|| amplitude(&name)).unwrap_or(x);
+        set(&mut from, &wider.refit.simulation, &name, x);
+    }
+    refit_from(setting, parent, wider, vec![from], None)
 }
 
 /// Refits one candidate from these values; `begun` is a fit that has not converged and goes on in the place of the first of them.
@@ -293,107 +317,4 @@ pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Ca
         .collect();
     out.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     out
-}
-
-/// An effect to be written: the mechanism, the slot's name, values of its parameters in the order of the law.
-pub struct Part {
-    /// The mechanism.
-    pub mechanism: &'static Mechanism,
-    /// The slot.
-    pub slot: String,
-    /// The form of its law.
-    pub purpose: Purpose,
-    /// Start values of amplitudes, then shapes; missing ones stay as the law has them.
-    pub values: Vec<Option<f64>>,
-    /// Share that the simulation's own parameters absorb, from the screening.
-    pub concealment: Option<f64>,
-}
-
-impl Part {
-    /// A candidate at a point of its grid, `amplitudes` as they explain the residual.
-    pub fn of_candidate(candidate: &Candidate, point: usize, amplitudes: &[(String, f64)]) -> Self {
-        let start = starts(candidate).into_iter().next().unwrap_or_default();
-        let shapes = candidate.points.get(point).map_or(&[][..], |p| &p.shapes);
-        let find = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
-        let values = candidate.refit.parameters_of();
-        Self {
-            mechanism: candidate.mechanism,
-            slot: candidate.slot.label.clone(),
-            purpose: candidate.refit.purpose,
-            values: values
-                .iter()
-                .map(|n| find(amplitudes, n).or_else(|| find(shapes, n)).or_else(|| find(&start, n)))
-                .collect(),
-            concealment: candidate.concealment(),
-        }
-    }
-
-    /// An effect of a fitted hypothesis, as it stands.
-    pub fn of_effect(effect: &Effect, values: &Values) -> Self {
-        Self {
-            mechanism: effect.mechanism,
-            slot: effect.slot.label.clone(),
-            purpose: effect.written.purpose,
-            values: effect.written.parameters_of().iter().map(|n| values.parameters.get(n).copied()).collect(),
-            concealment: effect.concealment,
-        }
-    }
-}
-
-/// Several effects written into the simulation of `trunk` one after the other and fitted for `iterations` from these values, first under
-/// this noise model.
-pub fn assemble<'d>(
-    setting: &Setting<'d>,
-    trunk: &Hypothesis<'_>,
-    own: &Values,
-    parts: &[Part],
-    noise: &Whitener,
-    iterations: usize,
-) -> Option<Hypothesis<'d>> {
-    let mut document = trunk.base.document();
-    let mut values = own.clone();
-    let mut effects = trunk.effects.clone();
-    for part in parts {
-        let (written, slot) =
-            rewrite_at(&trunk.base, &document, &setting.original, part.mechanism, &part.slot, part.purpose)?;
-        values = with_added_starts(&values, &written, &slot, setting.data.stretches.len());
-        for (name, x) in written.parameters_of().iter().zip(&part.values) {
-            if let Some(x) = x {
-                set(&mut values, &written.simulation, name, *x);
-            }
-        }
-        document = written.simulation.clone();
-        effects.push(Effect { mechanism: part.mechanism, slot, written, concealment: part.concealment });
-    }
-    let base = setting.fit(&document, &values, Some(noise), 1, iterations)?;
-    Some(setting.hypothesis(effects, base))
-}
-
-/// Goes on with a hypothesis that was fitted for a few iterations only.
-pub fn complete<'d>(setting: &Setting<'d>, mut h: Hypothesis<'d>) -> Hypothesis<'d> {
-    if let Some(base) = setting.further(&h.base, Some(&h.base.whitener), 2, setting.iterations)
-        && base.log_likelihood > h.base.log_likelihood
-    {
-        h.base = base;
-    }
-    finish(setting, &mut h, 0);
-    h
-}
-
-/// The set without its `index`-th effect: the others are written anew in their order and fitted from where they were.
-pub fn without<'d>(
-    setting: &Setting<'d>,
-    none: &Hypothesis<'d>,
-    set: &Hypothesis<'d>,
-    index: usize,
-) -> Option<Hypothesis<'d>> {
-    let values = set.base.values();
-    let rest: Vec<Part> = (set.effects.iter().enumerate())
-        .filter(|(i, _)| *i != index)
-        .map(|(_, e)| Part::of_effect(e, &values))
-        .collect();
-    if rest.is_empty() {
-        return None;
-    }
-    assemble(setting, none, &values, &rest, &none.base.whitener, setting.iterations).map(|h| complete(setting, h))
 }

@@ -11,6 +11,7 @@ pub mod reliability;
 pub mod slot;
 pub mod verdict;
 
+mod assemble;
 mod base;
 mod bootstrap;
 mod budget;

@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use crate::base::Base;
 use crate::budget::Step;
-use crate::compose::{Ask, SearchOptions, add, compose, short_list, unheard};
+use crate::compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short_list, unheard};
 use crate::error::DiagnoseError;
 use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
-use crate::fitting::{refit, refit_all};
+use crate::fitting::{refit, refit_all, refit_wider};
 use crate::hypothesis::{Hypothesis, Key, Setting};
 use crate::mechanism::Mechanism;
 use crate::model::{Model, Values};
@@ -146,6 +146,13 @@ impl<'a, 'd> Search<'a, 'd> {
             for h in refit_all(self.setting, none, &list) {
                 add(pool, h);
             }
+        }
+        if let Some((special, wider)) = outdone_by_a_special_case(pool, candidates)
+            && !self.setting.budget.omits(Step::Rivals)
+        {
+            let found: Vec<Hypothesis<'d>> =
+                wider.par_iter().filter_map(|c| refit_wider(self.setting, none, c, &pool[special])).collect();
+            found.into_iter().for_each(|h| add(pool, h));
         }
         if !self.setting.budget.omits(Step::Numerics)
             && let Some(h) = crate::numerics_check::artefact(self.setting, none)

@@ -1,6 +1,6 @@
 //! The electrical side of a drive: induced voltage and inductance.
 
-use crate::mechanism::path::FASTEST;
+use crate::mechanism::path::{FASTEST, SHORTEST};
 use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
@@ -17,7 +17,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
             .weight()
             .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
-            .within(0.02, 2000.0),
+            .within(SHORTEST, 2000.0),
         // A drive that is switched on has no current yet.
         Purpose::Form(Form::Finer) => Law::replace("u_e")
             .amplitude("k_e", "u/v", 0.0, 5.0)
@@ -29,7 +29,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
         Purpose::Refit | Purpose::Form(_) => Law::replace("lag(u - k_e*v, tau_e)")
             .amplitude("k_e", "u/v", 0.0, 5.0)
             .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
-            .within(0.02, 2000.0)
+            .within(SHORTEST, 2000.0)
             .never_baseline(),
     },
     contains: &["actuator_lag"],

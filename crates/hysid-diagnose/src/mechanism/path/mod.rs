@@ -13,6 +13,9 @@ use super::{Form, Law, Purpose, log_grid};
 /// Shortest time constant of a lag that is written as a state, in samples: the integration must follow it.
 pub(super) const FASTEST: f64 = 0.4;
 
+/// Shortest time constant of a lag, in samples: under a held input a hundredth of a sample still shows.
+pub(super) const SHORTEST: f64 = 0.001;
+
 /// A first-order lag of `signal`, settled at the first sample; in its finer form it starts where the recording says, as after switching on.
 fn first_order(signal: &str, purpose: Purpose) -> Law {
     let law = match purpose {
@@ -22,6 +25,6 @@ fn first_order(signal: &str, purpose: Purpose) -> Law {
         }
         Purpose::Refit | Purpose::Form(_) => Law::replace(format!("lag({signal}, tau)")),
     };
-    let fastest = if purpose == Purpose::Form(Form::Finer) { FASTEST } else { 0.02 };
+    let fastest = if purpose == Purpose::Form(Form::Finer) { FASTEST } else { SHORTEST };
     law.shape("tau", "h", log_grid(0.5, 50.0, 6)).within(fastest, 2000.0)
 }
