@@ -11,7 +11,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, multiply, pack, total};
+use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, flat_mut, multiply, pack, total};
 use hysid_linalg::product;
 
 use crate::{Factor, Quantity, Signal, Term};
@@ -244,7 +244,7 @@ impl Kernel {
             };
             index.insert(factors, series.len());
             series.push(Series { source, most, least, at: len });
-            // Series that begin alike with respect to cache lines multiply faster.
+            // Series that begin at a cache line are written and multiplied faster.
             len += (TILE + most - least).next_multiple_of(LANE);
         }
         // Heads, shorter ones first; each with its tails.
@@ -315,6 +315,7 @@ impl Kernel {
     /// Adds the `len` rows from `at` on.
     fn tile(&self, work: &mut Work, channels: &[Vec<f64>], at: usize, len: usize) {
         let Work { tile, heads, sums } = work;
+        let tile = flat_mut(tile);
         for s in &self.series {
             let (made, rest) = tile.split_at_mut(s.at);
             let out = &mut rest[..s.len()];
@@ -363,8 +364,9 @@ fn place(series: &[Series], index: &HashMap<Vec<Factor>, usize>, factors: &[Fact
 }
 
 /// The buffers of one thread.
+#[derive(Debug)]
 pub(crate) struct Work {
-    tile: Vec<f64>,
+    tile: Vec<Lane>,
     heads: Vec<Lane>,
     sums: Vec<Lane>,
 }
@@ -372,7 +374,7 @@ pub(crate) struct Work {
 impl Work {
     pub fn new(kernel: &Kernel) -> Self {
         Self {
-            tile: vec![0.0; kernel.len],
+            tile: vec![Lane::default(); kernel.len / LANE],
             heads: vec![Lane::default(); (kernel.heads.len() + 1) * T],
             sums: vec![Lane::default(); kernel.order.len()],
         }

@@ -7,9 +7,8 @@
 
 use std::collections::BTreeMap;
 
-use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, multiply, pack, total};
-use hysid_linalg::{Columns, product};
-use rayon::prelude::*;
+use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, flat, flat_mut, multiply, pack, total};
+use hysid_linalg::{Columns, map_blocks, product};
 
 use crate::design::Stretch;
 use crate::{Design, Factor, Quantity, Term};
@@ -91,7 +90,8 @@ impl Plan {
         for quantity in quantities {
             let most = factors.iter().filter(|f| f.quantity == quantity).map(|f| f.lag).max().unwrap_or(0);
             series.push(Series { quantity, most, at: len });
-            len += most + TILE;
+            // Series that begin at a cache line are written faster.
+            len += (most + TILE).next_multiple_of(LANE);
         }
         let place = |f: Factor| series.iter().find(|s| s.quantity == f.quantity).map_or(0, |s| s.at + s.most - f.lag);
         // Each class of tails, with the smallest and largest lag of its first factor.
@@ -115,7 +115,7 @@ impl Plan {
             let own = TILE + most - least;
             products.push(Product { factors: (place(first), place(second)), at: len, len: own });
             begins.insert(class, len + most);
-            len += own;
+            len += own.next_multiple_of(LANE);
         }
         let begin = |tail: &[Factor]| match *tail {
             [a, b] => begins.get(&class_of(a, b)).map_or(0, |at| at - a.lag),
@@ -143,8 +143,9 @@ impl Plan {
     fn accumulate(&self, work: &mut Work, k: usize, machine: Machine) {
         let together = (GROUP / k).max(1);
         let places = self.order.len();
-        let Work { tile, weights, heads, sums, rows, common, .. } = work;
-        for (group, &common) in self.nodes.chunks(together).zip(&*common) {
+        let Work { tile, weights, heads, sums, rows, shared, .. } = work;
+        let tile = flat(tile);
+        for (group, shared) in self.nodes.chunks(together).zip(&*shared) {
             for (g, node) in group.iter().enumerate() {
                 for c in 0..k {
                     let to = &mut heads[(g * k + c) * T..(g * k + c + 1) * T];
@@ -158,29 +159,39 @@ impl Plan {
                     }
                 }
             }
-            let first = &group[0];
-            for (g, node) in group.iter().enumerate() {
-                let own = node.tails.len() - common;
+            // `len` tails, from the one `end` before the last on, of these nodes, the first of which is number `from` of the group.
+            let mut step = |from: usize, nodes: &[Node], end: usize, len: usize| {
+                if len == 0 {
+                    return;
+                }
                 rows.clear();
-                rows.extend((0..k).map(|c| Row { from: (g * k + c) * T, to: c * places + node.first }));
-                Step { t: T, rows, left: heads, columns: &node.tails[..own], right: tile, out: sums }.run(machine);
-            }
-            rows.clear();
+                for (g, node) in nodes.iter().enumerate() {
+                    let to = node.first + node.tails.len() - end;
+                    rows.extend((0..k).map(|c| Row { from: ((from + g) * k + c) * T, to: c * places + to }));
+                }
+                let first = &nodes[0].tails;
+                let columns = &first[first.len() - end..first.len() - end + len];
+                Step { t: T, rows, left: heads, columns, right: tile, out: sums }.run(machine);
+            };
             for (g, node) in group.iter().enumerate() {
-                let to = node.first + node.tails.len() - common;
-                rows.extend((0..k).map(|c| Row { from: (g * k + c) * T, to: c * places + to }));
+                let next = shared.get(g + 1).copied().unwrap_or(0);
+                // A node's own tails, and those that all nodes up to it end with but the next does not.
+                step(g, &group[g..=g], node.tails.len(), node.tails.len() - shared[g]);
+                step(0, &group[..=g], shared[g], shared[g] - next);
             }
-            let columns = &first.tails[first.tails.len() - common..];
-            Step { t: T, rows, left: heads, columns, right: tile, out: sums }.run(machine);
         }
     }
 }
 
-/// How many tails all heads of the group end with.
-fn common_tails(group: &[Node]) -> usize {
-    let Some(shortest) = group.iter().min_by_key(|n| n.tails.len()) else { return 0 };
-    let ends = |n: usize| group.iter().all(|node| node.tails.ends_with(&shortest.tails[shortest.tails.len() - n..]));
-    (0..=shortest.tails.len()).rev().find(|&n| ends(n)).unwrap_or(0)
+/// How many tails the first, the first two, ... heads of the group all end with.
+fn shared_tails(group: &[Node]) -> Vec<usize> {
+    let first = &group[0].tails;
+    let ends_alike = |node: &Node| node.tails.iter().rev().zip(first.iter().rev()).take_while(|(a, b)| a == b).count();
+    let smallest = |least: &mut usize, node: &Node| {
+        *least = ends_alike(node).min(*least);
+        Some(*least)
+    };
+    group.iter().scan(usize::MAX, smallest).collect()
 }
 
 fn multiply_into(to: &mut [Lane], by: &[f64]) {
@@ -194,14 +205,14 @@ fn multiply_into(to: &mut [Lane], by: &[f64]) {
 /// The buffers of one block of samples.
 struct Work {
     /// The series, and the products that tails of two factors are.
-    tile: Vec<f64>,
+    tile: Vec<Lane>,
     weights: Vec<Lane>,
     heads: Vec<Lane>,
     /// `sums[c * places + place]`.
     sums: Vec<Lane>,
     rows: Vec<Row>,
-    /// For each group of heads, how many tails all of them end with; what comes before is each head's own.
-    common: Vec<usize>,
+    /// For each group of heads, how many tails the first, the first two, ... of them end with.
+    shared: Vec<Vec<usize>>,
     plain: Vec<f64>,
 }
 
@@ -209,12 +220,12 @@ impl Work {
     fn new(plan: &Plan, k: usize) -> Self {
         let lanes = |n: usize| vec![Lane::default(); n];
         Self {
-            tile: vec![0.0; plan.len],
+            tile: lanes(plan.len / LANE),
             weights: lanes(k * T),
             heads: lanes(k * (GROUP / k).max(1) * T),
             sums: lanes(plan.order.len() * k),
             rows: Vec::new(),
-            common: plan.nodes.chunks((GROUP / k).max(1)).map(common_tails).collect(),
+            shared: plan.nodes.chunks((GROUP / k).max(1)).map(shared_tails).collect(),
             plain: vec![0.0; TILE],
         }
     }
@@ -226,11 +237,7 @@ impl Design<'_> {
         let rows = self.rows();
         let block = rows.div_ceil(BLOCKS).max(SHORTEST_BLOCK).div_ceil(TILE) * TILE;
         let blocks: Vec<_> = (0..rows.div_ceil(block)).map(|b| b * block..((b + 1) * block).min(rows)).collect();
-        if work < SERIAL_BELOW || blocks.len() < 2 || rayon::current_num_threads() < 2 {
-            blocks.into_iter().map(f).collect()
-        } else {
-            blocks.into_par_iter().map(f).collect()
-        }
+        map_blocks(&blocks, work, SERIAL_BELOW, |range| f(range.clone()))
     }
 
     /// Calls `f(at, len)` for the tiles of a range of rows; a tile lies within one stretch.
@@ -281,10 +288,10 @@ impl Design<'_> {
                 let w = &y[at..at + len];
                 target += hysid_linalg::dot(w, w);
                 sum += w.iter().sum::<f64>();
-                self.fill_tile(&mut work.tile, stretch, at, len);
+                self.fill_tile(flat_mut(&mut work.tile), stretch, at, len);
                 pack(w, &mut work.weights);
                 plan.accumulate(&mut work, 1, machine);
-                product(&work.tile, &work.tile, &mut squares.tile);
+                product(flat(&work.tile), flat(&work.tile), flat_mut(&mut squares.tile));
                 work.plain[..len].fill(1.0);
                 pack(&work.plain[..len], &mut squares.weights);
                 plan.accumulate(&mut squares, 1, machine);
@@ -312,7 +319,7 @@ impl Design<'_> {
             let mut work = Work::new(plan, k);
             let mut constant = vec![0.0; k];
             self.over_tiles(range, |stretch, at, len| {
-                self.fill_tile(&mut work.tile, stretch, at, len);
+                self.fill_tile(flat_mut(&mut work.tile), stretch, at, len);
                 for (c, &j) in which.iter().enumerate() {
                     self.fill(j, at..at + len, &mut work.plain[..len]);
                     constant[c] += work.plain[..len].iter().sum::<f64>();

@@ -5,8 +5,9 @@
 //! that is exact in algebra and harmless in arithmetic as long as the ends are small beside the sums ([`Totals::is_sound`]).
 
 use std::ops::Range;
+use std::sync::Mutex;
 
-use hysid_linalg::{Gram, Matrix};
+use hysid_linalg::{Gram, Matrix, map_blocks};
 use rayon::prelude::*;
 
 use crate::Quantity;
@@ -16,8 +17,8 @@ use crate::distinct::{Class, Distinct, Kernel, Member, Work};
 pub(crate) const RUN: usize = 8192;
 /// Sums of runs that are held at the same time, about: 8 MB.
 const HELD: usize = 1_000_000;
-/// Shares of the runs for each thread, so that one that was held up does not keep the others waiting.
-const SHARES: usize = 8;
+/// Sums that a thread adds the runs to at a time.
+const TOGETHER: usize = 512;
 /// Work (in multiply-adds) below which threads cost more than they bring.
 const SERIAL_BELOW: usize = 3_000_000;
 
@@ -61,6 +62,8 @@ pub(crate) struct Totals {
     edges: Vec<Edge>,
     first_edge: Vec<usize>,
     rows: usize,
+    /// Buffers that no thread uses at the moment.
+    buffers: Mutex<Vec<Work>>,
 }
 
 impl Totals {
@@ -87,6 +90,7 @@ impl Totals {
             first_edge,
             distinct,
             rows: 0,
+            buffers: Mutex::default(),
         }
     }
 
@@ -102,25 +106,20 @@ impl Totals {
 
     /// Adds these rows of the channels, each range with what its lags look back on before it.
     pub fn add(&mut self, channels: &[Vec<f64>], ranges: &[Range<usize>]) {
-        let kernel = &self.kernel;
         let runs = runs(ranges);
         let rows: usize = ranges.iter().map(ExactSizeIterator::len).sum();
-        let threads = if rows * kernel.work() < SERIAL_BELOW { 1 } else { rayon::current_num_threads() };
-        for runs in runs.chunks((HELD / self.sums.len().max(1)).max(SHARES * threads)) {
-            // Buffers are made once for each share, not for each run.
-            let share = |runs: &[Vec<Range<usize>>]| -> Vec<Vec<f64>> {
-                let mut work = Work::new(kernel);
-                runs.iter().map(|run| kernel.sums(&mut work, channels, run)).collect()
-            };
-            let parts: Vec<Vec<Vec<f64>>> = if threads == 1 {
-                vec![share(runs)]
-            } else {
-                runs.par_chunks(runs.len().div_ceil(SHARES * threads)).map(share).collect()
-            };
-            for part in parts.iter().flatten() {
-                for (sum, p) in self.sums.iter_mut().zip(part) {
-                    sum.add(*p);
+        let work = rows * self.kernel.work();
+        for runs in runs.chunks((HELD / self.sums.len().max(1)).max(rayon::current_num_threads())) {
+            let parts = map_blocks(runs, work, SERIAL_BELOW, |run| self.one_run(channels, run));
+            let add = |(sums, from): (&mut [Sum], usize)| {
+                for part in &parts {
+                    sums.iter_mut().zip(&part[from..]).for_each(|(sum, p)| sum.add(*p));
                 }
+            };
+            let shares = self.sums.chunks_mut(TOGETHER).zip((0..).step_by(TOGETHER));
+            match work < SERIAL_BELOW {
+                true => shares.for_each(add),
+                false => shares.par_bridge().for_each(add),
             }
         }
         for range in ranges {
@@ -137,6 +136,17 @@ impl Totals {
             }
         }
         self.rows += rows;
+    }
+
+    /// The sums of all classes over one run, in buffers that are kept for the next.
+    fn one_run(&self, channels: &[Vec<f64>], run: &[Range<usize>]) -> Vec<f64> {
+        let kept = self.buffers.lock().ok().and_then(|mut kept| kept.pop());
+        let mut work = kept.unwrap_or_else(|| Work::new(&self.kernel));
+        let sums = self.kernel.sums(&mut work, channels, run);
+        if let Ok(mut kept) = self.buffers.lock() {
+            kept.push(work);
+        }
+        sums
     }
 
     /// The Gram matrix, the products with the output and its energy.

@@ -99,6 +99,17 @@ const BLOCKS: usize = 32;
 /// Work (in flops) below which threads cost more than they bring.
 const SERIAL_BELOW: usize = 4_000_000;
 
+/// `f` of each block, in the order of the blocks; on threads where `work` is at least `worth`.
+///
+/// A thread takes one block at a time: one that is held up does not keep the others waiting for more than that.
+pub fn map_blocks<B: Sync, R: Send>(blocks: &[B], work: usize, worth: usize, f: impl Fn(&B) -> R + Sync) -> Vec<R> {
+    if work < worth || blocks.len() < 2 || rayon::current_num_threads() < 2 {
+        blocks.iter().map(&f).collect()
+    } else {
+        blocks.par_iter().with_max_len(1).map(&f).collect()
+    }
+}
+
 /// The sum over blocks of rows of what `f(rows, partial)` writes into `partial` (length `width`, zero at first).
 ///
 /// `f` is called on tiles of at most 1024 rows. The blocks depend on `rows` only, and their sums are added in order.
@@ -129,11 +140,7 @@ pub fn sum_over_blocks(
         }
         sum
     };
-    let partials: Vec<Vec<f64>> = if work < SERIAL_BELOW || rayon::current_num_threads() < 2 {
-        blocks.iter().map(one).collect()
-    } else {
-        blocks.par_iter().map(one).collect()
-    };
+    let partials = map_blocks(&blocks, work, SERIAL_BELOW, one);
     let mut total = vec![0.0; width];
     for partial in &partials {
         for (t, p) in total.iter_mut().zip(partial) {

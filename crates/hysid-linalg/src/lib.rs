@@ -11,7 +11,7 @@ mod matrix;
 mod tall;
 mod vector;
 
-pub use columns::{Columns, Gram, Start, sum_over_blocks};
+pub use columns::{Columns, Gram, Start, map_blocks, sum_over_blocks};
 pub use lstsq::{LinalgError, Lstsq, lstsq, solve_factor};
 pub use matrix::Matrix;
 pub use tall::TallQr;

@@ -7,10 +7,9 @@
 use std::ops::Range;
 
 use hysid_linalg::{
-    Columns, Gram, Lstsq, Matrix, TallQr, dot, leave_one_out_sum, lstsq, solve_factor, subtract_multiple,
+    Columns, Gram, Lstsq, Matrix, TallQr, dot, leave_one_out_sum, lstsq, map_blocks, solve_factor, subtract_multiple,
     sum_over_blocks, take_out,
 };
-use rayon::prelude::*;
 
 use crate::Criterion;
 use crate::criterion::{Facts, value};
@@ -240,8 +239,9 @@ fn left_out_blocks<C: Columns + ?Sized>(
 pub(crate) fn factor<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize]) -> Vec<f64> {
     let (w, rows) = (columns.len() + 1, phi.rows());
     let block = rows.div_ceil(BLOCKS).max(8 * TILE);
-    let one = |b: usize| {
-        let (mut at, end) = (b * block, ((b + 1) * block).min(rows));
+    let blocks: Vec<Range<usize>> = (0..rows.div_ceil(block)).map(|b| b * block..((b + 1) * block).min(rows)).collect();
+    let one = |range: &Range<usize>| {
+        let (mut at, end) = (range.start, range.end);
         let mut qr = TallQr::new(w);
         let mut tile = vec![0.0; TILE.min(end - at) * w];
         while at < end {
@@ -255,12 +255,7 @@ pub(crate) fn factor<C: Columns + ?Sized>(phi: &C, y: &[f64], columns: &[usize])
         }
         qr
     };
-    let blocks = rows.div_ceil(block);
-    let parts: Vec<TallQr> = if 2 * rows * w * w < SERIAL_BELOW || blocks < 2 || rayon::current_num_threads() < 2 {
-        (0..blocks).map(one).collect()
-    } else {
-        (0..blocks).into_par_iter().map(one).collect()
-    };
+    let parts = map_blocks(&blocks, 2 * rows * w * w, SERIAL_BELOW, one);
     let mut parts = parts.into_iter();
     let mut whole = parts.next().unwrap_or_else(|| TallQr::new(w));
     for part in parts {

@@ -9,8 +9,8 @@ use super::{LANE, Lane};
 pub(super) trait Form {
     /// A lane in registers.
     type V: Copy;
-    /// Columns in a register block of eight, four, two rows, and of one; zero rules a number of rows out.
-    const BLOCK: [usize; 4];
+    /// The most columns in a register block of one row, of two, ...; it has no block of more rows than are listed.
+    const BLOCK: &[usize];
     unsafe fn load(from: &Lane) -> Self::V;
     /// Eight doubles from anywhere; they must be readable.
     unsafe fn load_any(from: *const f64) -> Self::V;
@@ -25,7 +25,7 @@ pub(super) struct Plain;
 
 impl Form for Plain {
     type V = Lane;
-    const BLOCK: [usize; 4] = [0, 1, 2, 2];
+    const BLOCK: &[usize] = &[2, 2, 1, 1];
     #[inline(always)]
     unsafe fn load(from: &Lane) -> Lane {
         *from
@@ -65,7 +65,7 @@ pub(super) mod x86 {
 
     impl Form for Wide {
         type V = __m512d;
-        const BLOCK: [usize; 4] = [3, 6, 8, 8];
+        const BLOCK: &[usize] = &[8, 8, 7, 6, 5, 4, 3, 3];
         #[inline(always)]
         unsafe fn load(from: &Lane) -> __m512d {
             // SAFETY: a lane is 64 bytes, aligned to 64.
@@ -99,7 +99,7 @@ pub(super) mod x86 {
 
     impl Form for Fused {
         type V = (__m256d, __m256d);
-        const BLOCK: [usize; 4] = [0, 1, 2, 4];
+        const BLOCK: &[usize] = &[4, 2, 1, 1];
         #[inline(always)]
         unsafe fn load(from: &Lane) -> Self::V {
             let p = from.0.as_ptr();

@@ -20,6 +20,18 @@ pub const LANE: usize = 8;
 #[repr(C, align(64))]
 pub struct Lane(pub [f64; LANE]);
 
+/// The samples of lanes as plain numbers.
+pub fn flat(lanes: &[Lane]) -> &[f64] {
+    // SAFETY: a lane is eight doubles and nothing else.
+    unsafe { std::slice::from_raw_parts(lanes.as_ptr().cast(), lanes.len() * LANE) }
+}
+
+/// The samples of lanes as plain numbers: a buffer that begins at a cache line, which stores into it want.
+pub fn flat_mut(lanes: &mut [Lane]) -> &mut [f64] {
+    // SAFETY: as above.
+    unsafe { std::slice::from_raw_parts_mut(lanes.as_mut_ptr().cast(), lanes.len() * LANE) }
+}
+
 /// The sum of the eight.
 pub fn total(lane: &Lane) -> f64 {
     let s = &lane.0;
@@ -163,46 +175,43 @@ unsafe fn multiply_in<F: Form>(a: &[Lane], b: &[f64], out: &mut [Lane]) {
 /// As for [`Form`].
 #[inline(always)]
 unsafe fn step<F: Form>(step: Step<'_>) {
-    let Step { t, rows, left, columns, right, out } = step;
-    let mut rest = rows;
-    while !rest.is_empty() {
-        let (high, most) = match rest.len() {
-            8.. if F::BLOCK[0] > 0 => (8, F::BLOCK[0]),
-            4.. => (4, F::BLOCK[1]),
-            2.. => (2, F::BLOCK[2]),
-            _ => (1, F::BLOCK[3]),
-        };
-        let mut at = 0;
+    let Step { t, mut rows, left, columns, right, out } = step;
+    // Rows and columns are cut into blocks as equal as they can be: a rest of one row would keep most of the registers idle.
+    let mut blocks = rows.len().div_ceil(F::BLOCK.len());
+    while !rows.is_empty() {
+        let high = rows.len().div_ceil(blocks);
+        blocks -= 1;
+        let most = F::BLOCK[high - 1];
+        let (mut at, mut parts) = (0, columns.len().div_ceil(most));
         while at < columns.len() {
             let c = &columns[at..];
-            // Four columns in blocks of at most three are two and two.
-            let wide = if most == 3 && c.len() == 4 { 2 } else { most.min(c.len()) };
-            // SAFETY: the caller's.
-            at += unsafe {
-                match (high, wide) {
-                    (8, 3..) => block::<F, 8, 3>(t, rest, at, left, c, right, out),
-                    (8, 2) => block::<F, 8, 2>(t, rest, at, left, c, right, out),
-                    (8, _) => block::<F, 8, 1>(t, rest, at, left, c, right, out),
-                    (4, 6..) => block::<F, 4, 6>(t, rest, at, left, c, right, out),
-                    (4, 3..) => block::<F, 4, 3>(t, rest, at, left, c, right, out),
-                    (4, 2) => block::<F, 4, 2>(t, rest, at, left, c, right, out),
-                    (4, _) => block::<F, 4, 1>(t, rest, at, left, c, right, out),
-                    (2, 8..) => block::<F, 2, 8>(t, rest, at, left, c, right, out),
-                    (2, 4..) => block::<F, 2, 4>(t, rest, at, left, c, right, out),
-                    (2, 2..) => block::<F, 2, 2>(t, rest, at, left, c, right, out),
-                    (2, _) => block::<F, 2, 1>(t, rest, at, left, c, right, out),
-                    (_, 8..) => block::<F, 1, 8>(t, rest, at, left, c, right, out),
-                    (_, 4..) => block::<F, 1, 4>(t, rest, at, left, c, right, out),
-                    (_, 2..) => block::<F, 1, 2>(t, rest, at, left, c, right, out),
-                    (_, _) => block::<F, 1, 1>(t, rest, at, left, c, right, out),
-                }
+            let wide = c.len().div_ceil(parts);
+            parts -= 1;
+            macro_rules! shapes {
+                ($($k:literal: $($l:literal)*;)*) => {
+                    match (high, wide) {
+                        // Shapes that a form does not have are left out when it is compiled. SAFETY: the caller's.
+                        $($(($k, $l) if F::BLOCK.len() >= $k && F::BLOCK[$k - 1] >= $l => unsafe {
+                            block::<F, $k, $l>(t, rows, at, left, c, right, out)
+                        },)*)*
+                        _ => unreachable!("{high} x {wide}"),
+                    }
+                };
+            }
+            shapes! {
+                1: 1 2 3 4 5 6 7 8; 2: 1 2 3 4 5 6 7 8; 3: 1 2 3 4 5 6 7; 4: 1 2 3 4 5 6;
+                5: 1 2 3 4 5; 6: 1 2 3 4; 7: 1 2 3; 8: 1 2 3;
             };
+            at += wide;
         }
-        rest = &rest[high..];
+        rows = &rows[high..];
     }
 }
 
-/// One register block: the first `K` rows and the first `L` of `columns`, which are columns `at..` of the step; returns `L`.
+/// Steps of a block's loop that are written out.
+const UNROLL: usize = 4;
+
+/// One register block: the first `K` rows and the first `L` of `columns`, which are columns `at..` of the step.
 ///
 /// # Safety
 /// As for [`Form`].
@@ -215,30 +224,42 @@ unsafe fn block<F: Form, const K: usize, const L: usize>(
     columns: &[u32],
     right: &[f64],
     out: &mut [Lane],
-) -> usize {
+) {
     let a: [&[Lane]; K] = std::array::from_fn(|i| &left[rows[i].from..rows[i].from + t]);
     let x: [&[f64]; L] = std::array::from_fn(|l| &right[columns[l] as usize..columns[l] as usize + t * LANE]);
     // SAFETY: the caller's; all slices have t lanes.
     unsafe {
         let zero = F::load(&Lane([0.0; LANE]));
         let mut sums = [[zero; L]; K];
-        for s in 0..t {
-            let b: [F::V; L] = std::array::from_fn(|l| F::load_any(x[l].as_ptr().add(s * LANE)));
-            for i in 0..K {
-                let w = F::load(a[i].get_unchecked(s));
-                for l in 0..L {
-                    sums[i][l] = F::mul_add(w, b[l], sums[i][l]);
+        let mut s = 0;
+        // Not a closure: that would not be compiled for the form's processor.
+        macro_rules! add {
+            () => {
+                let b: [F::V; L] = std::array::from_fn(|l| F::load_any(x[l].as_ptr().add(s * LANE)));
+                for i in 0..K {
+                    let w = F::load(a[i].get_unchecked(s));
+                    for l in 0..L {
+                        sums[i][l] = F::mul_add(w, b[l], sums[i][l]);
+                    }
                 }
+                s += 1;
+            };
+        }
+        while s + UNROLL <= t {
+            for _ in 0..UNROLL {
+                add!();
             }
         }
+        while s < t {
+            add!();
+        }
         for i in 0..K {
+            let out = &mut out[rows[i].to + at..rows[i].to + at + L];
             for l in 0..L {
-                let o = &mut out[rows[i].to + at + l];
-                F::store(F::add(F::load(o), sums[i][l]), o);
+                F::store(F::add(F::load(&out[l]), sums[i][l]), &mut out[l]);
             }
         }
     }
-    L
 }
 
 #[cfg(test)]
@@ -260,7 +281,22 @@ mod tests {
         if Machine::detect() == Machine::Wide {
             machines.push(Machine::Wide);
         }
-        for (k, n) in [(1, 1), (1, 19), (2, 7), (3, 13), (4, 6), (7, 20), (8, 17), (15, 3), (9, 4), (12, 5)] {
+        for (k, n) in [
+            (1, 1),
+            (1, 19),
+            (2, 7),
+            (3, 13),
+            (4, 6),
+            (7, 20),
+            (8, 17),
+            (15, 3),
+            (9, 4),
+            (12, 5),
+            (5, 9),
+            (6, 4),
+            (7, 7),
+            (3, 8),
+        ] {
             let left = lanes(k * t, 5000);
             // Columns that overlap, at odd places.
             let columns: Vec<u32> = (0..n).map(|i| (i * (t * LANE - 5)) as u32).collect();
@@ -279,6 +315,15 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn lanes_are_eight_doubles_and_nothing_else() {
+        let mut lanes = [Lane([1.0; LANE]), Lane([2.0; LANE])];
+        flat_mut(&mut lanes)[LANE] = 5.0;
+        assert_eq!(lanes[1].0[0], 5.0);
+        assert_eq!((flat(&lanes).len(), flat(&lanes)[LANE + 1]), (2 * LANE, 2.0));
+        assert_eq!(flat(&[]).len(), 0);
     }
 
     #[test]
