@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hysid_linalg::{Columns, Gram, Matrix, Start};
+use hysid_linalg::{Columns, Gram, Matrix, Start, multiply_by};
 use rayon::prelude::*;
 
 use crate::kernel::Plan;
@@ -101,7 +101,7 @@ impl<'d> Design<'d> {
     /// The target: the output at each row.
     pub fn target(&self) -> Vec<f64> {
         let mut y = vec![0.0; self.rows];
-        self.fill_factor(Factor::value(Signal::Output, 0), 0..self.rows, &mut y, |o, v| *o = v);
+        self.fill_factor(Factor::value(Signal::Output, 0), 0..self.rows, &mut y, <[f64]>::copy_from_slice);
         y
     }
 
@@ -127,10 +127,10 @@ impl<'d> Design<'d> {
         let mut factors = term.factors().iter();
         match factors.next() {
             None => out.fill(1.0),
-            Some(&first) => self.fill_factor(first, rows.clone(), out, |o, v| *o = v),
+            Some(&first) => self.fill_factor(first, rows.clone(), out, <[f64]>::copy_from_slice),
         }
         for &f in factors {
-            self.fill_factor(f, rows.clone(), out, |o, v| *o *= v);
+            self.fill_factor(f, rows.clone(), out, |out, x| multiply_by(x, out));
         }
     }
 
@@ -161,7 +161,7 @@ impl<'d> Design<'d> {
         factor: Factor,
         rows: Range<usize>,
         out: &mut [f64],
-        join: impl Fn(&mut f64, f64),
+        join: impl Fn(&mut [f64], &[f64]),
     ) {
         let quantity = self.quantities.binary_search(&factor.quantity).unwrap_or(0);
         let mut at = self.stretches.partition_point(|s| s.row + s.len <= rows.start);
@@ -171,9 +171,7 @@ impl<'d> Design<'d> {
             let end = rows.end.min(s.row + s.len);
             let from = s.first + (done - s.row) - factor.lag;
             let source = &self.channels[s.record][quantity][from..from + (end - done)];
-            for (o, &v) in out[done - rows.start..end - rows.start].iter_mut().zip(source) {
-                join(o, v);
-            }
+            join(&mut out[done - rows.start..end - rows.start], source);
             done = end;
             at += 1;
         }

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, flat, flat_mut, multiply, pack, total};
-use hysid_linalg::{Columns, map_blocks, product};
+use hysid_linalg::{Columns, map_blocks, multiply_by, product};
 
 use crate::design::Stretch;
 use crate::{Design, Factor, Quantity, Term};
@@ -155,7 +155,7 @@ impl Plan {
                         [at, ..] => multiply(weight, &tile[at..at + TILE], to, machine),
                     }
                     for &at in node.head.iter().skip(1) {
-                        multiply_into(to, &tile[at..at + TILE]);
+                        multiply_by(&tile[at..at + TILE], flat_mut(to));
                     }
                 }
             }
@@ -192,14 +192,6 @@ fn shared_tails(group: &[Node]) -> Vec<usize> {
         Some(*least)
     };
     group.iter().scan(usize::MAX, smallest).collect()
-}
-
-fn multiply_into(to: &mut [Lane], by: &[f64]) {
-    for (a, b) in to.iter_mut().zip(by.chunks_exact(LANE)) {
-        for (a, b) in a.0.iter_mut().zip(b) {
-            *a *= b;
-        }
-    }
 }
 
 /// The buffers of one block of samples.
@@ -320,10 +312,13 @@ impl Design<'_> {
             let mut constant = vec![0.0; k];
             self.over_tiles(range, |stretch, at, len| {
                 self.fill_tile(flat_mut(&mut work.tile), stretch, at, len);
-                for (c, &j) in which.iter().enumerate() {
-                    self.fill(j, at..at + len, &mut work.plain[..len]);
-                    constant[c] += work.plain[..len].iter().sum::<f64>();
-                    pack(&work.plain[..len], &mut work.weights[c * T..(c + 1) * T]);
+                for (weights, &j) in work.weights.chunks_exact_mut(T).zip(which) {
+                    let weights = flat_mut(weights);
+                    self.fill(j, at..at + len, &mut weights[..len]);
+                    weights[len..].fill(0.0);
+                }
+                if plan.constant.is_some() {
+                    sums_of(flat(&work.weights), len, &mut constant);
                 }
                 plan.accumulate(&mut work, k, machine);
             });
@@ -341,6 +336,20 @@ impl Design<'_> {
             out
         });
         add_up(partials)
+    }
+}
+
+/// Adds to each of `sums` the sum of the first `len` samples of its tile, sample by sample. Tiles take turns in eights: no addition waits
+/// for the one before.
+fn sums_of(tiles: &[f64], len: usize, sums: &mut [f64]) {
+    for (tiles, sums) in tiles.chunks(LANE * TILE).zip(sums.chunks_mut(LANE)) {
+        let mut own = [0.0; LANE];
+        for n in 0..len {
+            for (own, tile) in own.iter_mut().zip(tiles.chunks_exact(TILE)) {
+                *own += tile[n];
+            }
+        }
+        sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
     }
 }
 

@@ -5,13 +5,14 @@
 //!
 //! Reference: Demmel, Grigori, Hoemmen, Langou, "Communication-optimal parallel and sequential QR" (2012).
 
-use crate::{dot, subtract_multiple};
+use crate::dot;
+use crate::lanes::reflect;
 
 /// The upper triangular factor R of a matrix that arrives in tiles of rows.
 #[derive(Debug, Clone)]
 pub struct TallQr {
     cols: usize,
-    /// R, column-major, `cols` x `cols`.
+    /// R, row by row, `cols` x `cols`.
     r: Vec<f64>,
 }
 
@@ -37,33 +38,29 @@ impl TallQr {
             let beta = if pivot > 0.0 { -norm } else { norm };
             let v0 = pivot - beta;
             let scale = -1.0 / (beta * v0);
-            for j in k + 1..n {
-                let y = &mut tail[(j - k - 1) * rows..(j - k) * rows];
-                let s = (v0 * self.r[j * n + k] + dot(x, y)) * scale;
-                self.r[j * n + k] -= s * v0;
-                subtract_multiple(s, x, y);
-            }
+            reflect(v0, scale, x, &mut self.r[k * n + k + 1..(k + 1) * n], tail);
             self.r[k * n + k] = beta;
         }
     }
 
     /// Takes in another factor of the same width.
     pub fn merge(&mut self, other: &Self) {
-        let mut tile = other.r.clone();
-        self.push(self.cols, &mut tile);
+        self.push(self.cols, &mut other.by_columns());
     }
 
     /// R, column-major, `cols` x `cols`, with a diagonal that is not negative.
     pub fn into_factor(mut self) -> Vec<f64> {
-        let n = self.cols;
-        for k in 0..n {
-            if self.r[k * n + k] < 0.0 {
-                for j in k..n {
-                    self.r[j * n + k] = -self.r[j * n + k];
-                }
+        for (k, row) in self.r.chunks_exact_mut(self.cols.max(1)).enumerate() {
+            if row[k] < 0.0 {
+                row[k..].iter_mut().for_each(|r| *r = -*r);
             }
         }
-        self.r
+        self.by_columns()
+    }
+
+    fn by_columns(&self) -> Vec<f64> {
+        let n = self.cols;
+        (0..n * n).map(|i| self.r[i % n * n + i / n]).collect()
     }
 }
 

@@ -73,10 +73,10 @@ both_forms! {
 }
 
 both_forms! {
-    /// y -= a x.
-    pub fn subtract_multiple(a: f64, x: &[f64], y: &mut [f64]) {
+    /// y *= x, entry by entry.
+    pub fn multiply_by(x: &[f64], y: &mut [f64]) {
         for (y, x) in y.iter_mut().zip(x) {
-            *y -= a * x;
+            *y *= x;
         }
     }
 }

@@ -6,9 +6,10 @@
 
 use std::ops::Range;
 
+use hysid_linalg::lanes::subtract_multiples;
 use hysid_linalg::{
-    Columns, Gram, Lstsq, Matrix, TallQr, dot, leave_one_out_sum, lstsq, map_blocks, solve_factor, subtract_multiple,
-    sum_over_blocks, take_out,
+    Columns, Gram, Lstsq, Matrix, TallQr, dot, leave_one_out_sum, lstsq, map_blocks, solve_factor, sum_over_blocks,
+    take_out,
 };
 
 use crate::Criterion;
@@ -171,10 +172,7 @@ fn rotate<C: Columns + ?Sized>(
         let (before, rest) = q.split_at_mut(k * len);
         let qk = &mut rest[..len];
         phi.fill(columns[k], range.clone(), qk);
-        for i in 0..k {
-            let rik = r[k * w + i];
-            subtract_multiple(rik, &before[i * len..(i + 1) * len], qk);
-        }
+        subtract_multiples(&r[k * w..k * w + k], before, qk);
         let pivot = r[k * w + k];
         let inverse = if pivot > 0.0 { 1.0 / pivot } else { 0.0 };
         let g = r[n * w + k];

@@ -15,6 +15,8 @@ pub(super) trait Form {
     /// Eight doubles from anywhere; they must be readable.
     unsafe fn load_any(from: *const f64) -> Self::V;
     unsafe fn store(v: Self::V, to: &mut Lane);
+    /// Eight doubles to anywhere; they must be writable.
+    unsafe fn store_any(v: Self::V, to: *mut f64);
     unsafe fn mul(a: Self::V, b: Self::V) -> Self::V;
     unsafe fn add(a: Self::V, b: Self::V) -> Self::V;
     unsafe fn mul_add(a: Self::V, b: Self::V, c: Self::V) -> Self::V;
@@ -38,6 +40,11 @@ impl Form for Plain {
     #[inline(always)]
     unsafe fn store(v: Lane, to: &mut Lane) {
         *to = v;
+    }
+    #[inline(always)]
+    unsafe fn store_any(v: Lane, to: *mut f64) {
+        // SAFETY: the caller's; an array of doubles needs no more alignment than a double.
+        unsafe { *to.cast::<[f64; LANE]>() = v.0 };
     }
     #[inline(always)]
     unsafe fn mul(a: Lane, b: Lane) -> Lane {
@@ -82,6 +89,11 @@ pub(super) mod x86 {
             unsafe { _mm512_store_pd(to.0.as_mut_ptr(), v) }
         }
         #[inline(always)]
+        unsafe fn store_any(v: __m512d, to: *mut f64) {
+            // SAFETY: the caller's.
+            unsafe { _mm512_storeu_pd(to, v) }
+        }
+        #[inline(always)]
         unsafe fn mul(a: __m512d, b: __m512d) -> __m512d {
             unsafe { _mm512_mul_pd(a, b) }
         }
@@ -118,6 +130,14 @@ pub(super) mod x86 {
             unsafe {
                 _mm256_store_pd(p, v.0);
                 _mm256_store_pd(p.add(4), v.1);
+            }
+        }
+        #[inline(always)]
+        unsafe fn store_any(v: Self::V, to: *mut f64) {
+            // SAFETY: the caller's.
+            unsafe {
+                _mm256_storeu_pd(to, v.0);
+                _mm256_storeu_pd(to.add(4), v.1);
             }
         }
         #[inline(always)]

@@ -6,8 +6,10 @@
 //! The same source is compiled for AVX-512, for AVX2 with FMA and for the baseline, and chosen at run time. Results differ
 //! in the last bits between such machines (fused against separate rounding), never between numbers of threads.
 
+mod columns;
 mod form;
 
+pub use self::columns::{reflect, subtract_multiples};
 #[cfg(target_arch = "x86_64")]
 use self::form::x86;
 use self::form::{Form, Plain};
