@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use hysid_linalg::all_finite;
+
 /// One recording: the output and the inputs on one clock. A missing sample is `NaN`.
 #[derive(Debug, Clone)]
 pub struct Record<'a> {
@@ -39,8 +41,7 @@ impl<'a> Record<'a> {
             while at < end {
                 let next = end.min(at + LOOK);
                 // Most data have no gaps, and a stretch without one is known faster as a whole.
-                let whole = |x: &[f64]| x[at..next].iter().fold(true, |all, v| all & v.is_finite());
-                if !(whole(self.y) && self.inputs.iter().all(|u| whole(u))) {
+                if !(all_finite(&self.y[at..next]) && self.inputs.iter().all(|u| all_finite(&u[at..next]))) {
                     for n in at..next {
                         if !(self.y[n].is_finite() && self.inputs.iter().all(|u| u[n].is_finite())) {
                             if from < n {

@@ -8,7 +8,6 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use hysid_linalg::{Gram, Matrix, map_blocks};
-use rayon::prelude::*;
 
 use crate::Quantity;
 use crate::distinct::{Class, Distinct, Kernel, Member, Work};
@@ -17,8 +16,6 @@ use crate::distinct::{Class, Distinct, Kernel, Member, Work};
 pub(crate) const RUN: usize = 8192;
 /// Sums of runs that are held at the same time, about: 8 MB.
 const HELD: usize = 1_000_000;
-/// Sums that a thread adds the runs to at a time.
-const TOGETHER: usize = 512;
 /// Work (in multiply-adds) below which threads cost more than they bring.
 const SERIAL_BELOW: usize = 3_000_000;
 
@@ -111,15 +108,10 @@ impl Totals {
         let work = rows * self.kernel.work();
         for runs in runs.chunks((HELD / self.sums.len().max(1)).max(rayon::current_num_threads())) {
             let parts = map_blocks(runs, work, SERIAL_BELOW, |run| self.one_run(channels, run));
-            let add = |(sums, from): (&mut [Sum], usize)| {
-                for part in &parts {
-                    sums.iter_mut().zip(&part[from..]).for_each(|(sum, p)| sum.add(*p));
+            for part in &parts {
+                for (sum, p) in self.sums.iter_mut().zip(part) {
+                    sum.add(*p);
                 }
-            };
-            let shares = self.sums.chunks_mut(TOGETHER).zip((0..).step_by(TOGETHER));
-            match work < SERIAL_BELOW {
-                true => shares.for_each(add),
-                false => shares.par_bridge().for_each(add),
             }
         }
         for range in ranges {

@@ -44,6 +44,14 @@ both_forms! {
 }
 
 both_forms! {
+    /// Whether every entry is finite.
+    pub fn all_finite(x: &[f64]) -> bool {
+        // Without an early end, so that it vectorises.
+        x.iter().fold(true, |all, v| all & (v.abs() < f64::INFINITY))
+    }
+}
+
+both_forms! {
     /// out = a b, entry by entry.
     pub fn product(a: &[f64], b: &[f64], out: &mut [f64]) {
         for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
@@ -126,6 +134,19 @@ mod tests {
             let squares: f64 = a.iter().map(|x| x * x / 4.0).sum();
             approx::assert_relative_eq!(leave_one_out_sum(&a, &b, 1e-9), squares, max_relative = 1e-14);
         }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_found_wherever_it_is() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for place in [0, 7, 8, 36] {
+                let mut x = vec![f64::MAX; 37];
+                assert!(all_finite(&x));
+                x[place] = bad;
+                assert!(!all_finite(&x), "{bad} at {place}");
+            }
+        }
+        assert!(all_finite(&[]));
     }
 
     #[test]

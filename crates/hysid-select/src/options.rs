@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hysid_linalg::Gram;
+use hysid_linalg::{Gram, dot};
 
 /// How subsets of columns are looked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -186,7 +186,8 @@ impl Options {
         if rows == 0 || cols == 0 {
             return Err(SelectError::Empty { rows, cols });
         }
-        if y.iter().any(|v| !(v * v).is_finite()) {
+        // One look at the sum of squares, and at each only where that is not finite.
+        if !dot(y, y).is_finite() && y.iter().any(|v| !(v * v).is_finite()) {
             return Err(SelectError::NotFinite("the target".into()));
         }
         if y.iter().all(|v| *v == 0.0) {

@@ -6,6 +6,8 @@ use anyhow::Context;
 use serde_json::Value;
 use xshell::{Shell, cmd};
 
+use super::measure::before_all_others;
+
 /// The rates, each with its unit, under the key by which `timed limits` prints them.
 const RATES: [(&str, &str); 2] = [
     ("gflops", "fused multiply-adds from registers, GFLOP/s (two for each)"),
@@ -32,7 +34,8 @@ pub fn run(shell: &Shell, root: &Path, rounds: usize) -> anyhow::Result<String> 
         block += &format!("| {name} | {one:.1} | {two:.1} | {:.2} |\n", two / one);
     }
     Ok(format!(
-        "{block}\nBest of {rounds} times five, in turns, each thread on numbers of its own; `cargo xtask bench --limits --rounds {rounds}`.\n"
+        "{block}\nBest of {rounds} times five, in turns, each thread on numbers of its own; `{}cargo xtask bench --limits --rounds {rounds}`.\n",
+        before_all_others()
     ))
 }
 

@@ -103,7 +103,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     for case in known.iter().filter(|c| args.cases.is_empty() || args.cases.iter().any(|n| n == c.name)) {
         let outcomes = place.run(case, rounds).with_context(|| case.name.to_string())?;
         let peers = if args.peers { " --peers" } else { "" };
-        let command = format!("cargo xtask bench{peers} --cases {} --rounds {rounds}", case.name);
+        let command =
+            format!("{}cargo xtask bench{peers} --cases {} --rounds {rounds}", measure::before_all_others(), case.name);
         renew(case.name, &page::block(case, &outcomes, &command))?;
     }
     Ok(())

@@ -7,7 +7,7 @@ use hysid_report::figure::{LogAxes, Mark, Plot, Tone};
 use serde_json::Value;
 use xshell::{Shell, cmd};
 
-use super::measure::Spread;
+use super::measure::{Spread, before_all_others};
 use super::page::spread;
 
 /// The cost over one axis: for each place the CPU seconds of every round.
@@ -64,7 +64,7 @@ pub fn run(shell: &Shell, root: &Path, rounds: usize) -> anyhow::Result<String> 
         std::fs::write(folder.join(&file), svg)?;
         figures += &format!("![CPU time against {label}](figures/{file})\n");
     }
-    let command = format!("`cargo xtask bench --plots --rounds {rounds}`");
+    let command = format!("`{}cargo xtask bench --plots --rounds {rounds}`", before_all_others());
     Ok(format!(
         "{block}\nLines over logarithms, by least squares; one thread, median of {rounds} rounds (smallest to largest slope of a round), {command}.\n\n{figures}"
     ))

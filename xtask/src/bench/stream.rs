@@ -13,6 +13,7 @@ use hysid_dictionary::{Factor, Model, Quantity, Term};
 use serde_json::Value;
 use xshell::{Shell, cmd};
 
+use super::measure::before_all_others;
 use super::page::renew;
 
 /// Size of the file.
@@ -29,7 +30,10 @@ pub fn run(shell: &Shell, root: &Path) -> anyhow::Result<()> {
     let text = measure(shell, root, &file.0, &model)?;
     let page = root.join("docs/performance.md");
     let old = std::fs::read_to_string(&page)?;
-    std::fs::write(&page, renew(&old, "stream", &format!("\n{text}\n")))?;
+    std::fs::write(
+        &page,
+        renew(&old, "stream", &format!("\n{text}\n`{}cargo xtask bench --cases stream`.\n", before_all_others())),
+    )?;
     eprintln!("wrote {}", page.display());
     Ok(())
 }
