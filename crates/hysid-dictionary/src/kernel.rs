@@ -318,7 +318,7 @@ impl Design<'_> {
                     weights[len..].fill(0.0);
                 }
                 if plan.constant.is_some() {
-                    sums_of(flat(&work.weights), len, &mut constant);
+                    add_sums(flat(&work.weights), len, &mut constant);
                 }
                 plan.accumulate(&mut work, k, machine);
             });
@@ -339,18 +339,31 @@ impl Design<'_> {
     }
 }
 
-/// Adds to each of `sums` the sum of the first `len` samples of its tile, sample by sample. Tiles take turns in eights: no addition waits
+/// Adds to each of `sums` the sum of the first `len` samples of its tile, sample by sample; four tiles take turns, so that no addition waits
 /// for the one before.
-fn sums_of(tiles: &[f64], len: usize, sums: &mut [f64]) {
-    for (tiles, sums) in tiles.chunks(LANE * TILE).zip(sums.chunks_mut(LANE)) {
-        let mut own = [0.0; LANE];
-        for n in 0..len {
-            for (own, tile) in own.iter_mut().zip(tiles.chunks_exact(TILE)) {
-                *own += tile[n];
+fn add_sums(tiles: &[f64], len: usize, sums: &mut [f64]) {
+    for (tiles, sums) in tiles.chunks(4 * TILE).zip(sums.chunks_mut(4)) {
+        let tile = |c: usize| &tiles[c * TILE..c * TILE + len];
+        match sums {
+            [a, b, c, d] => {
+                let own = sums_of([tile(0), tile(1), tile(2), tile(3)]);
+                [a, b, c, d].into_iter().zip(own).for_each(|(sum, own)| *sum += own);
             }
+            few => few.iter_mut().enumerate().for_each(|(c, sum)| *sum += sums_of([tile(c)])[0]),
         }
-        sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
     }
+}
+
+fn sums_of<const C: usize>(tiles: [&[f64]; C]) -> [f64; C] {
+    let len = tiles.iter().map(|t| t.len()).min().unwrap_or(0);
+    let tiles = tiles.map(|t| &t[..len]);
+    let mut sums = [0.0; C];
+    for n in 0..len {
+        for c in 0..C {
+            sums[c] += tiles[c][n];
+        }
+    }
+    sums
 }
 
 /// The sum of the partial results, in order.

@@ -47,6 +47,7 @@ mod record;
 mod run;
 mod signals;
 mod spec;
+mod sums;
 mod term;
 mod totals;
 mod whole;

@@ -10,7 +10,8 @@ use std::sync::Mutex;
 use hysid_linalg::{Gram, Matrix, map_blocks};
 
 use crate::Quantity;
-use crate::distinct::{Class, Distinct, Kernel, Member, Work};
+use crate::distinct::{Class, Distinct, Member};
+use crate::sums::{Kernel, Work};
 
 /// Rows whose sums are made from zero, at most.
 pub(crate) const RUN: usize = 8192;
