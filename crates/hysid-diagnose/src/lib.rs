@@ -33,6 +33,7 @@ mod joint;
 mod model;
 mod numerics_check;
 mod openset;
+mod peaks;
 mod pipeline;
 mod random;
 mod records;

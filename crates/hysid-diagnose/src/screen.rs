@@ -13,6 +13,7 @@ use crate::evidence::{FeatureGroup, Projector, norm2, score};
 use crate::hypothesis::{Effect, Key};
 use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, catalogue};
 use crate::model::{Model, Values};
+use crate::peaks::residual_peaks;
 use crate::slot::{Slot, Structure};
 
 /// Points of a candidate whose columns are kept for pairs.
@@ -259,31 +260,6 @@ fn features(
         });
     }
     (!points.is_empty()).then_some(points)
-}
-
-/// Frequencies of the largest peaks of the residual's spectrum, in hertz.
-fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
-    let data = base.model.data();
-    let Some(series) = data.layout.series.iter().max_by_key(|s| s.rows.len()) else { return Vec::new() };
-    let white = base.whitener.apply(&data.layout, &base.fit.residual);
-    let x = &white[series.rows.clone()];
-    let lines = hysid_signal::fourier(x);
-    let power: Vec<f64> = lines.iter().map(|(re, im)| re * re + im * im).collect();
-    let width = 1.0 / (data.row_period_s() * x.len() as f64);
-    let mut peaks: Vec<usize> =
-        (2..power.len().saturating_sub(1)).filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1]).collect();
-    peaks.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
-    peaks.truncate(4);
-    let mut out = Vec::new();
-    for k in peaks {
-        // The line's true frequency by the parabola through the logarithms.
-        let (a, b, c) = (power[k - 1].max(1e-300).ln(), power[k].max(1e-300).ln(), power[k + 1].max(1e-300).ln());
-        let shift =
-            if (a - 2.0 * b + c).abs() > 1e-12 { (0.5 * (a - c) / (a - 2.0 * b + c)).clamp(-0.5, 0.5) } else { 0.0 };
-        out.push((k as f64 + shift) * width);
-    }
-    out.sort_by(f64::total_cmp);
-    out
 }
 
 /// The values with a start for each state that an effect added: where the state of the slot that it goes with starts (`x_a` with `x`).
