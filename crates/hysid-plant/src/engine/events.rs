@@ -69,7 +69,7 @@ impl<N: Single> Machine<'_, N> {
     /// Rates of a surface's argument with its sign at 1 and at -1, from `x`.
     fn rates_beside(&mut self, surface: usize) -> (f64, f64) {
         let zero = N::lift(0.0);
-        let moment = self.moment(self.tau, zero, zero, Phase::Start);
+        let moment = self.moment(self.tau, zero, zero, Phase::Event);
         let x = std::mem::take(&mut self.x);
         let mut k = std::mem::take(&mut self.spare);
         let kept = self.modes[surface];
@@ -132,6 +132,9 @@ impl<N: Single> Machine<'_, N> {
 
     /// Goes on by `h` from `tau` after the present sample, through every event on the way.
     pub fn advance(&mut self, tau: f64, h: f64) {
+        if self.delays && self.advance_through_jumps(tau, h) {
+            return;
+        }
         if !self.modes.is_empty() {
             if self.any_stuck && self.hold == Hold::Zero {
                 // A held input may have jumped.
@@ -146,13 +149,39 @@ impl<N: Single> Machine<'_, N> {
             self.measure_trial(tau, h);
             if self.distances.iter().any(|d| *d < 0.0) {
                 self.tau = N::lift(tau);
-                self.go_through_events(h);
+                self.go_through_events(N::lift(h), true);
                 return;
             }
         } else {
             self.step(tau, h);
         }
         self.accept(tau, h);
+    }
+
+    /// As [`Machine::advance`], in steps that end where an input jumps or bends behind a delay; `false`, with nothing done, where none does.
+    ///
+    /// The lengths carry the derivative by the delay: where friction sticks a jump may set the motion free, and that moment moves with it.
+    fn advance_through_jumps(&mut self, tau: f64, h: f64) -> bool {
+        let period = self.run.drive.period_s;
+        let sample_s = period * self.n as f64;
+        // A jump this near to an end of the step is at that end.
+        let slack = 1e-9 * h;
+        let mut left = N::lift(h);
+        self.tau = N::lift(tau);
+        let mut split = false;
+        loop {
+            let (from, until) = (sample_s + self.tau.value() + slack, sample_s + tau + h - slack);
+            let next = self.cells.iter().filter_map(|cell| cell.next_jump(period, from, until));
+            let Some(at) = next.min_by(|a, b| a.value().total_cmp(&b.value())) else { break };
+            let length = at.sub(N::lift(sample_s)).sub(self.tau);
+            self.go_through_events(length, false);
+            left = left.sub(length);
+            split = true;
+        }
+        if split {
+            self.go_through_events(left, false);
+        }
+        split
     }
 
     /// Lets go of every surface whose sign is beyond its range, and tells whether there was one.
@@ -175,14 +204,14 @@ impl<N: Single> Machine<'_, N> {
         self.distances.clear();
         self.distances.extend(distances);
         self.tau = N::lift(tau);
-        self.go_through_events(h);
+        self.go_through_events(N::lift(h), true);
     }
 
-    /// Goes on by `h` from `self.tau`; `distances` are those at the end of a step of that length, tried in vain.
-    fn go_through_events(&mut self, h: f64) {
-        let mut rest = N::lift(h);
+    /// Goes on by `h` from `self.tau`; where a step of that length was `tried` in vain, `distances` are those at its end.
+    fn go_through_events(&mut self, h: N, tried: bool) {
+        let mut rest = h;
         for event in 0..MAX_EVENTS {
-            if event > 0 {
+            if event > 0 || !tried {
                 // Another surface's event may have jumped the forces.
                 if self.any_stuck && self.release(rest) {
                     continue;
@@ -220,7 +249,7 @@ impl<N: Single> Machine<'_, N> {
             } else {
                 self.decide(surface);
             }
-            if rest.value() <= 1e-9 * h {
+            if rest.value() <= 1e-9 * h.value() {
                 return;
             }
         }

@@ -53,6 +53,8 @@ pub(super) struct Machine<'a, N> {
     pub added: Vec<Added<'a>>,
     pub registers: Vec<N>,
     pub cells: Vec<Cell<N>>,
+    /// Whether steps end where an input that passed a delay jumps or bends.
+    pub delays: bool,
     pub modes: Vec<Mode>,
     pub sigma: Vec<N>,
     pub x: Vec<N>,
@@ -103,7 +105,9 @@ impl<'a, N: Number> Machine<'a, N> {
             (true, Hold::Linear) => Follow::Linear,
             (true, Hold::Zero) => Follow::Held,
         };
-        let cells = model.delay_of_input.iter().map(|&of_input| Cell::new(follow(of_input))).collect();
+        let cells: Vec<Cell<N>> = model.delay_of_input.iter().map(|&of_input| Cell::new(follow(of_input))).collect();
+        // Without friction that sticks the mean over a step says enough.
+        let delays = !model.surfaces.is_empty() && model.delay_of_input.contains(&true);
         let values = run.injections.iter().map(|i| Added::new(i, None));
         let tangents = directions.iter().enumerate().filter_map(|(k, d)| match d {
             Direction::Injection(i) => Some(Added::new(i, Some(k))),
@@ -117,6 +121,7 @@ impl<'a, N: Number> Machine<'a, N> {
             added: values.chain(tangents).collect(),
             registers,
             cells,
+            delays,
             modes: vec![Mode::Positive; model.surfaces.len()],
             sigma: vec![zero; model.surfaces.len()],
             x: vec![zero; states],

@@ -8,8 +8,8 @@
 //! - `lag` is exact for an argument that is linear between commits (so for every input, held or linear); within a
 //!   step a derivative sees what makes the step's integrals exact, however short the time constant.
 //! - `delay` of inputs is linear between samples; under a zero-order hold a derivative sees the mean of the held signal over
-//!   the step, so that the response moves smoothly with the delay. `delay` of a state interpolates what was committed, by a
-//!   cubic where the neighbours are evenly spread.
+//!   the step, so that the response moves smoothly with the delay. Where friction may stick, steps end where the delayed signal
+//!   jumps or bends. `delay` of a state interpolates what was committed, by a cubic where the neighbours are evenly spread.
 //! - A half-width, time constant or delay below zero acts as zero.
 
 use crate::expr::Function;
@@ -54,6 +54,8 @@ impl<S> Moment<S> {
 pub(super) enum Phase {
     /// At its start, where a held input has just jumped.
     Start,
+    /// At a moment at which the motion is decided anew.
+    Event,
     /// Later.
     Inside,
 }
@@ -93,10 +95,16 @@ impl<N: Number> Decay<N> {
     /// What the stages see, so that the step integrates the difference exactly, once and twice. A lag shorter than the step has a transient
     /// that passes between the stages; with its values there the response would not move with the time constant.
     fn seen(ratio: N, decay: N) -> (N, N) {
-        // Beyond, the differences below would be rounding.
-        let ratio = ratio.min(N::lift(1e5));
-        let once = ratio.mul(N::lift(1.0).sub(decay));
-        let twice = ratio.mul(N::lift(1.0).sub(once));
+        // The step over the time constant where it is small: there the differences would be rounding, and their series is exact.
+        let long = N::lift(1e3);
+        let z = N::lift(1.0).div(ratio.max(long));
+        let series =
+            |by_order: [f64; 4]| by_order.into_iter().rev().fold(N::lift(0.0), |sum, c| sum.mul(z).add(N::lift(c)));
+        let beyond = ratio.sub(long);
+        let once = series([1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0])
+            .where_positive(beyond, ratio.min(long).mul(N::lift(1.0).sub(decay)));
+        let twice = series([1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0])
+            .where_positive(beyond, ratio.min(long).mul(N::lift(1.0).sub(once)));
         let middle = once.scale(3.0).sub(twice.scale(3.0)).sub(decay.scale(0.5));
         (twice.scale(6.0).sub(middle.scale(2.0)), middle)
     }
@@ -117,6 +125,8 @@ pub(super) struct Cell<N> {
     hint: usize,
     /// Of a lag: what a plain length of time does, for the lengths that were met last.
     decays: [Option<Decay<N>>; 2],
+    /// Of a delay: how long it was when it was asked last.
+    seconds: Option<N>,
     follow: Follow,
     /// The first evaluation fills the memory.
     filled: bool,
@@ -153,6 +163,7 @@ impl<N: Number> Cell<N> {
             past: Vec::new(),
             hint: 0,
             decays: [None; 2],
+            seconds: None,
             follow,
             filled: false,
         }
@@ -212,7 +223,7 @@ impl<N: Number> Cell<N> {
             let start = self.held.sub(self.argument).add(slope_tau);
             let left = if moment.midway() { self.decay(moment.step, tau).seen.1 } else { gone.decay };
             w.sub(slope_tau).add(start.mul(left))
-        } else if step > 0.0 {
+        } else if step > 0.0 && moment.phase == Phase::Start {
             w.add(self.held.sub(w).mul(self.decay(moment.step, tau).seen.0))
         } else {
             self.held.where_positive(tau, w)
@@ -259,8 +270,12 @@ impl<N: Number> Cell<N> {
             }
         }
         let seconds = seconds.max(N::lift(0.0));
+        self.seconds = Some(seconds);
         self.now = (w, w);
         let since = moment.since.seconds();
+        if self.follow == Follow::Held && moment.phase == Phase::Event {
+            return self.held_at(elapsed.sub(seconds), w, elapsed);
+        }
         if self.follow == Follow::Held && moment.step.value() > 0.0 {
             return self.mean_of_held(elapsed.sub(since).sub(seconds), moment.step.seconds());
         }
@@ -277,6 +292,16 @@ impl<N: Number> Cell<N> {
         self.before(target, w, elapsed)
     }
 
+    /// When a signal that is held, or bends, every `period` next does so behind this delay, later than `from` and before `until` (seconds from
+    /// the first sample).
+    pub fn next_jump(&self, period: f64, from: f64, until: f64) -> Option<N> {
+        let seconds = self.seconds.filter(|_| self.follow != Follow::Smooth)?;
+        // Before the first sample everything is at rest.
+        let knot = ((from - seconds.value()) / period).floor().max(0.0) + 1.0;
+        let at = seconds.add(N::lift(knot * period));
+        (at.value() < until).then_some(at)
+    }
+
     /// How many of the past's times the test holds for, where it holds up to some time.
     #[inline(always)]
     fn count(&mut self, test: impl Fn(f64) -> bool) -> usize {
@@ -290,6 +315,16 @@ impl<N: Number> Cell<N> {
         }
         self.hint = next;
         next
+    }
+
+    /// The held argument at a time, after the jump where it jumps there; `w` is what it is `now`.
+    fn held_at(&mut self, target: N, w: N, now: N) -> N {
+        let reached = target.value() + 1e-12 * now.value();
+        if reached >= now.value() {
+            return w;
+        }
+        let next = self.count(|time| time <= reached);
+        self.past.get(next.saturating_sub(1)).map_or(w, |knot| knot.1)
     }
 
     /// The mean of the held argument over `length` from `start`.
