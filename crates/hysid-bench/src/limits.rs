@@ -1,4 +1,4 @@
-//! What this machine can do at most: multiply-adds from registers, and traffic to memory, on one thread and on more.
+//! What this machine can do at most: multiply-adds from registers and from the nearest cache, and traffic to memory, on one thread and on more.
 //!
 //! The rates that the rows of `docs/performance.md` are held against. Every thread works on numbers of its own; a rate is that of all
 //! threads together over the time of the slowest, the best of the rounds, since what disturbs can only slow it down.
@@ -7,11 +7,15 @@ use std::hint::black_box;
 use std::sync::Barrier;
 use std::time::Instant;
 
+use hysid_linalg::lanes::{LANE, Lane, Machine, Row, Step, flat};
+
 /// Rates of all threads together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Fused multiply-adds from registers: 10^9 floating-point operations a second, two for each.
     pub gflops: f64,
+    /// The matrix product that selection is made of, on one tile that stays in the first-level cache: likewise.
+    pub product_gflops: f64,
     /// a = b + s c over vectors larger than the caches: 10^9 bytes a second, 24 for each entry.
     pub gigabytes: f64,
 }
@@ -20,10 +24,12 @@ pub struct Limits {
 pub fn measure(threads: usize, rounds: usize) -> Limits {
     let flops = 2.0 * (CHAINS * LANE * TURNS) as f64;
     let gflops = best(threads, rounds, flops, || (), |()| multiply_adds(black_box(1.0)));
+    let flops = 2.0 * (ROWS * COLUMNS * TILE * LANE * PASSES) as f64;
+    let product_gflops = best(threads, rounds, flops, Tile::new, Tile::multiply);
     let bytes = 24.0 * ENTRIES as f64;
     let vectors = || [0.0, 1.0, 2.0].map(|x| vec![x; ENTRIES]);
     let gigabytes = best(threads, rounds, bytes, vectors, |[a, b, c]| triad(a, b, c));
-    Limits { gflops, gigabytes }
+    Limits { gflops, product_gflops, gigabytes }
 }
 
 /// The best rate of all threads together, in 10^9 a second; `amount` is what one thread does in a round.
@@ -56,8 +62,6 @@ fn best<T>(
     1e-9 * amount * seconds.len() as f64 / quickest
 }
 
-/// Doubles in the widest register.
-const LANE: usize = 8;
 /// Chains of multiply-adds that do not wait for each other: more than latency times units of any processor, fewer than registers.
 const CHAINS: usize = 12;
 /// Multiply-adds of a chain in a round, about 0.1 s.
@@ -101,6 +105,40 @@ fn chains(x: f64, multiply_add: impl Fn(f64, f64, f64) -> f64) -> [[f64; LANE]; 
         }
     }
     sums
+}
+
+/// Rows and columns of the product, and lanes of a tile: 40 KB in all.
+const ROWS: usize = 8;
+const COLUMNS: usize = 12;
+const TILE: usize = 32;
+/// Products in a round, about 0.1 s.
+const PASSES: usize = 100_000;
+
+struct Tile {
+    rows: Vec<Row>,
+    columns: Vec<u32>,
+    samples: Vec<Lane>,
+    sums: Vec<Lane>,
+}
+
+impl Tile {
+    fn new() -> Self {
+        Self {
+            rows: (0..ROWS).map(|i| Row { from: i * TILE, to: i * COLUMNS }).collect(),
+            columns: (0..COLUMNS).map(|l| ((ROWS + l) * TILE * LANE) as u32).collect(),
+            samples: vec![Lane([1e-3; LANE]); (ROWS + COLUMNS) * TILE],
+            sums: vec![Lane::default(); ROWS * COLUMNS],
+        }
+    }
+
+    fn multiply(&mut self) {
+        let (machine, samples) = (Machine::detect(), black_box(&self.samples));
+        for _ in 0..PASSES {
+            let Self { rows, columns, sums, .. } = self;
+            Step { t: TILE, rows, left: samples, columns, right: flat(samples), out: sums }.run(machine);
+        }
+        black_box(&self.sums);
+    }
 }
 
 /// Entries of each of the three vectors of a thread: 256 MB.

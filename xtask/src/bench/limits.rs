@@ -9,8 +9,9 @@ use xshell::{Shell, cmd};
 use super::measure::before_all_others;
 
 /// The rates, each with its unit, under the key by which `timed limits` prints them.
-const RATES: [(&str, &str); 2] = [
+const RATES: [(&str, &str); 3] = [
     ("gflops", "fused multiply-adds from registers, GFLOP/s (two for each)"),
+    ("product_gflops", "the matrix product of a selection on a tile in the first-level cache, GFLOP/s"),
     ("gigabytes", "a = b + s c over vectors of 256 MB, GB/s (24 bytes for each entry)"),
 ];
 

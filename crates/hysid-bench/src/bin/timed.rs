@@ -57,8 +57,10 @@ fn run(words: &[&str]) -> Result<String, Box<dyn Error>> {
         }
         ["scaling", rounds] => scaling(rounds.parse()?),
         ["limits", threads, rounds] => {
-            let Limits { gflops, gigabytes } = measure(threads.parse()?, rounds.parse()?);
-            Ok(format!("{{\"gflops\": {gflops:.1}, \"gigabytes\": {gigabytes:.1}}}"))
+            let Limits { gflops, product_gflops, gigabytes } = measure(threads.parse()?, rounds.parse()?);
+            Ok(format!(
+                "{{\"gflops\": {gflops:.1}, \"product_gflops\": {product_gflops:.1}, \"gigabytes\": {gigabytes:.1}}}"
+            ))
         }
         _ => Err("unknown words".into()),
     }
