@@ -354,6 +354,7 @@ fn add_sums(tiles: &[f64], len: usize, sums: &mut [f64]) {
     }
 }
 
+#[allow(clippy::needless_range_loop, reason = "several tiles at the same place")]
 fn sums_of<const C: usize>(tiles: [&[f64]; C]) -> [f64; C] {
     let len = tiles.iter().map(|t| t.len()).min().unwrap_or(0);
     let tiles = tiles.map(|t| &t[..len]);

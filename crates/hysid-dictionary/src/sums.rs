@@ -125,8 +125,8 @@ impl Kernel {
         }
         // Heads by their factor of largest lag, then the one before it, ...; each with its tails. So a head comes after the one that it is
         // made of, and those that end before a tail begins come before the others: tails that begin later have the same heads and more.
-        let key = |head: &[Factor]| head.iter().rev().map(|f| (f.lag, f.quantity)).collect::<Vec<_>>();
-        let mut by_head: BTreeMap<Vec<(usize, Quantity)>, Vec<(u32, u32)>> = BTreeMap::new();
+        let key = |head: &[Factor]| head.iter().rev().map(|f| (f.lag, f.quantity)).collect::<Head>();
+        let mut by_head: BTreeMap<Head, Vec<(u32, u32)>> = BTreeMap::new();
         for (class, (head, tail)) in parts.iter().enumerate().filter(|(_, (_, tail))| !tail.is_empty()) {
             let head = key(head);
             for n in 1..=head.len() {
@@ -136,8 +136,7 @@ impl Kernel {
             by_head.entry(head).or_default().push((tail, class as u32));
         }
         by_head.entry(Vec::new()).or_default();
-        let numbers: HashMap<Vec<(usize, Quantity)>, usize> =
-            by_head.keys().enumerate().map(|(n, head)| (head.clone(), n)).collect();
+        let numbers: HashMap<Head, usize> = by_head.keys().enumerate().map(|(n, head)| (head.clone(), n)).collect();
         let mut heads = Vec::with_capacity(by_head.len());
         // The heads of each tail, and the tails that have the same heads.
         let mut by_tail: BTreeMap<u32, Vec<(usize, u32)>> = BTreeMap::new();
@@ -223,6 +222,9 @@ impl Kernel {
         }
     }
 }
+
+/// The factors of a head as lag and quantity, the largest lag first.
+type Head = Vec<(usize, Quantity)>;
 
 /// Series by degree and factors, the first of lag 0, with the smallest and largest shift.
 type Needed = BTreeMap<(usize, Vec<Factor>), (usize, usize)>;

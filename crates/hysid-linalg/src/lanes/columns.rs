@@ -67,6 +67,7 @@ unsafe fn reflect_in<F: Form>(v0: f64, scale: f64, x: &[f64], tops: &mut [f64], 
 
 /// # Safety
 /// As for [`Form`]; `C` tops and columns.
+#[allow(clippy::needless_range_loop, reason = "places in registers, not a walk through an array")]
 #[inline(always)]
 unsafe fn reflect_some<F: Form, const C: usize>(v0: f64, scale: f64, x: &[f64], tops: &mut [f64], columns: &mut [f64]) {
     let rows = x.len();
@@ -146,6 +147,7 @@ fn subtract_fused(a: &[f64], columns: &[f64], y: &mut [f64]) {
 
 /// # Safety
 /// As for [`Form`].
+#[allow(clippy::needless_range_loop, reason = "places in registers, not a walk through an array")]
 #[inline(always)]
 unsafe fn subtract_in<F: Form>(a: &[f64], columns: &[f64], y: &mut [f64]) {
     let rows = y.len();
