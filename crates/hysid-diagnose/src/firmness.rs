@@ -11,6 +11,9 @@ const TRIFLE: f64 = 0.02;
 
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
+/// The same between shifts in time that pass between samples: whether a winding starts with its current or without it shows in all of a
+/// motion that is integrated, and no law tells how a recording began.
+const REFUTED_BUT_FOR_THE_START: f64 = 60.0;
 
 /// Probabilities of the sets of a pool.
 pub fn likelihoods(
@@ -66,15 +69,12 @@ fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let best = &pool[winner];
     let Some(twin) = best.effects[member].mechanism.family.twin() else { return false };
     let rest = best.key_without(member);
-    let unseen = passes_between_samples(best, member);
+    let refuted = if passes_between_samples(best, member) { REFUTED_BUT_FOR_THE_START } else { REFUTED };
     pool.iter().any(|h| {
         let of_twin = h.effects.iter().position(|e| e.mechanism.family == twin);
-        of_twin.is_some_and(|place| {
-            let as_well = h.effects.len() == best.effects.len()
-                && h.key_without(place) == rest
-                && h.base.log_likelihood > best.base.log_likelihood - REFUTED;
-            unseen || as_well
-        })
+        h.effects.len() == best.effects.len()
+            && of_twin.is_some_and(|place| h.key_without(place) == rest)
+            && h.base.log_likelihood > best.base.log_likelihood - refuted
     })
 }
 
