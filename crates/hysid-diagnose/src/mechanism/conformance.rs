@@ -1,5 +1,6 @@
 //! What every mechanism must satisfy, as a suite that can be run on any simulation.
 
+mod derivatives;
 mod motion;
 mod recovery;
 
@@ -10,7 +11,7 @@ use hysid_plant::{Expr, Simulation};
 use super::{Mechanism, Purpose, Signals, Value, catalogue};
 use crate::slot::{Slot, Structure};
 
-pub use motion::{Bench, example_recording};
+pub use motion::{Bench, example_recording, jumping_recording};
 
 /// Base simulations of every kind of plant that the catalogue knows.
 pub fn specimens() -> Vec<Simulation> {

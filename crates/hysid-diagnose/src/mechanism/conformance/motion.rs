@@ -25,8 +25,32 @@ pub fn example_recording(simulation: &Simulation, period_s: f64, size: f64) -> O
         let line = |cycles: f64, phase: f64| (std::f64::consts::TAU * cycles * t + phase + channel as f64).sin();
         size * level * (line(7.0, 0.3) + 0.8 * line(16.0, 1.1) + 0.6 * line(31.0, 2.3) + 0.5 * line(62.0, 0.9))
     };
-    let mut inputs: Vec<Vec<f64>> =
-        (0..simulation.inputs.len()).map(|c| (0..SAMPLES).map(|n| wave(n, c)).collect()).collect();
+    let inputs = (0..simulation.inputs.len()).map(|c| (0..SAMPLES).map(|n| wave(n, c)).collect()).collect();
+    recorded(simulation, period_s, inputs)
+}
+
+/// As [`example_recording`], with levels without a pattern that are held for a few samples.
+pub fn jumping_recording(simulation: &Simulation, period_s: f64, size: f64) -> Option<Recording> {
+    let mut state = 0_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / (1_u64 << 31) as f64
+    };
+    let mut levels = || {
+        let mut series = Vec::with_capacity(SAMPLES);
+        while series.len() < SAMPLES {
+            let level = 1.5 * size * (2.0 * uniform() - 1.0) * if uniform() < 0.3 { 0.2 } else { 1.0 };
+            let held = 1 + (uniform() * SAMPLES as f64 / 250.0) as usize;
+            series.extend(std::iter::repeat_n(level, held.min(SAMPLES - series.len())));
+        }
+        series
+    };
+    let inputs = (0..simulation.inputs.len()).map(|_| levels()).collect();
+    recorded(simulation, period_s, inputs)
+}
+
+/// These inputs with what the simulation answers.
+fn recorded(simulation: &Simulation, period_s: f64, mut inputs: Vec<Vec<f64>>) -> Option<Recording> {
     // A velocity beside its displacement is its derivative.
     if let [x, v, ..] = inputs.as_mut_slice() {
         let last = SAMPLES - 1;
@@ -83,12 +107,16 @@ pub(super) fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 impl Bench {
     /// A bench for a simulation: its own response to [`example_recording`].
     pub fn new(simulation: &Simulation, period_s: f64, size: f64) -> Option<Self> {
-        let recording = example_recording(simulation, period_s, size)?;
+        Self::of(simulation, &example_recording(simulation, period_s, size)?)
+    }
+
+    /// A bench for a simulation under a recording's inputs.
+    pub fn of(simulation: &Simulation, recording: &Recording) -> Option<Self> {
         let compiled = Compiled::new(simulation).ok()?;
         let range = 0..recording.len();
-        let drive = Drive::from_recording(&compiled, &recording, range.clone()).ok()?;
+        let drive = Drive::from_recording(&compiled, recording, range.clone()).ok()?;
         let structure = Structure::of(simulation);
-        let stretch = Stretch { recording: &recording, range: &range, free: &[] };
+        let stretch = Stretch { recording, range: &range, free: &[] };
         let signals = survey(simulation, &structure, &[stretch]).ok()?;
         let baseline = outputs(simulation, &drive)?;
         Some(Self { simulation: simulation.clone(), drive, structure, signals, baseline })
@@ -109,7 +137,7 @@ impl Bench {
             .collect()
     }
 
-    fn breach(&self, mechanism: &'static Mechanism, slot: &Slot, what: String) -> Breach {
+    pub(super) fn breach(&self, mechanism: &'static Mechanism, slot: &Slot, what: String) -> Breach {
         Breach { mechanism: mechanism.id, at: format!("{} at {}", self.simulation.title, slot.label), what }
     }
 

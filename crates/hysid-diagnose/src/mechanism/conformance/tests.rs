@@ -42,6 +42,22 @@ fn neutral_values_are_the_baseline_and_every_amplitude_moves_an_output() {
     assert!(shown.is_empty(), "{} breaches:\n{}", shown.len(), shown.join("\n"));
 }
 
+/// Under inputs that jump, where friction sticks and is set free.
+#[test]
+fn derivatives_are_those_of_the_simulation() {
+    let mut shown = Vec::new();
+    for (simulation, (period_s, size)) in specimens().iter().zip(EXCITATION) {
+        let bench = Bench::of(simulation, &jumping_recording(simulation, *period_s, *size).unwrap()).unwrap();
+        for mechanism in catalogue() {
+            for (slot, signals) in bench.slots(mechanism) {
+                let found = bench.check_derivatives(mechanism, &slot, &signals);
+                shown.extend(found.into_iter().map(|b| format!("{}: {}: {}", b.mechanism, b.at, b.what)));
+            }
+        }
+    }
+    assert!(shown.is_empty(), "{} breaches:\n{}", shown.len(), shown.join("\n"));
+}
+
 #[test]
 fn the_form_holds_on_the_simulations_of_the_recordings() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/simulations");
