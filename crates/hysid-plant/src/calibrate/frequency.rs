@@ -11,13 +11,14 @@ use super::Data;
 use crate::document::Hold;
 use crate::engine::Compiled;
 
-type C = Complex<f64>;
+pub(crate) type C = Complex<f64>;
 
-/// One line of the measured response.
+/// One line of a response from samples to samples.
 pub(crate) struct Line {
-    omega: f64,
+    /// Radians per second.
+    pub omega: f64,
     /// Output by input, with weights.
-    response: Vec<(C, f64)>,
+    pub response: Vec<(C, f64)>,
 }
 
 /// Most lines that are kept.
@@ -149,7 +150,17 @@ fn eliminate(a: &mut [C], b: &mut [C], n: usize, columns: usize) -> bool {
     true
 }
 
-/// Residuals of the linearised equations against the measured response; `None` where they are not finite.
+/// What a hold does to a line at `phase` radians per sample.
+pub(crate) fn hold_response(hold: Hold, phase: f64) -> C {
+    let half = 0.5 * phase;
+    let sinc = if half > 1e-9 { half.sin() / half } else { 1.0 };
+    match hold {
+        Hold::Zero => C::from_polar(sinc, -half),
+        Hold::Linear => C::new(sinc * sinc, 0.0),
+    }
+}
+
+/// Residuals of the linearised equations against a response; `None` where they are not finite.
 pub(crate) fn residuals(
     compiled: &Compiled,
     lines: &[Line],
@@ -177,13 +188,7 @@ pub(crate) fn residuals(
             }
         }
         let solved = eliminate(&mut system, &mut right, n, m);
-        // The hold's own response.
-        let half = 0.5 * line.omega * period;
-        let sinc = if half > 1e-9 { half.sin() / half } else { 1.0 };
-        let hold = match compiled.hold() {
-            Hold::Zero => C::from_polar(sinc, -half),
-            Hold::Linear => C::new(sinc * sinc, 0.0),
-        };
+        let hold = hold_response(compiled.hold(), line.omega * period);
         for j in 0..p {
             for i in 0..m {
                 let (measured, weight) = line.response.get(j * m + i).copied()?;

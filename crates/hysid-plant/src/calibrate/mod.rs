@@ -14,6 +14,7 @@ mod least_squares;
 mod noise;
 mod objective;
 mod observer;
+mod refined;
 mod search;
 mod settings;
 mod starts;

@@ -27,9 +27,24 @@ impl Compiled {
         let Some(longest) = short.iter().max_by_key(|d| d.len()) else { return (None, 0) };
         let designed = starts::design(self, estimated, 64, settings.seed);
         let mut all = vec![user.to_vec()];
-        all.extend(starts::from_response(self, longest, estimated, &designed, 2, substeps));
+        if let Some(core) = starts::Core::new(self, longest, estimated, &designed, substeps) {
+            all.extend(core.from_identification(1));
+            all.extend(core.from_measured_response(2));
+        }
         all.extend(designed.iter().step_by(11).cloned());
-        let (lower, upper) = self.box_of(&short, estimated);
+        self.search_from(all, &short, estimated, white, substeps)
+    }
+
+    /// The best of short searches from these starts, and the simulations that took.
+    fn search_from(
+        &self,
+        all: Vec<Vec<f64>>,
+        short: &[Data],
+        estimated: &[usize],
+        white: &[NoiseModel],
+        substeps: usize,
+    ) -> (Option<Vec<f64>>, usize) {
+        let (lower, upper) = self.box_of(short, estimated);
         let mut simulations = 0;
         let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
         let samples: usize = short.iter().map(Data::len).sum::<usize>() * white.len();
@@ -37,7 +52,7 @@ impl Compiled {
         for theta in all {
             let mut objective = Objective {
                 compiled: self,
-                data: &short,
+                data: short,
                 estimated,
                 theta: theta.clone(),
                 substeps,
@@ -45,7 +60,7 @@ impl Compiled {
                 gains: None,
                 simulations: 0,
             };
-            let mut p = self.point(&short, estimated, &theta, None);
+            let mut p = self.point(short, estimated, &theta, None);
             let mut best = f64::INFINITY;
             for &strength in strengths {
                 let now = objective.theta(&p);
