@@ -1,5 +1,7 @@
 //! The search for the best start: from each of several, a homotopy from prediction to the free run on part of the data.
 
+use std::cell::LazyCell;
+
 use super::Data;
 use super::least_squares::{Limits, minimise};
 use super::noise::NoiseModel;
@@ -26,19 +28,22 @@ impl Compiled {
         let short: Vec<Data> = self.excerpts(data);
         let Some(longest) = short.iter().max_by_key(|d| d.len()) else { return (None, 0) };
         let designed = starts::design(self, estimated, 64, settings.seed);
-        let mut all = vec![user.to_vec()];
-        if let Some(core) = starts::Core::new(self, longest, estimated, &designed, substeps) {
-            all.extend(core.from_identification(1));
-            all.extend(core.from_measured_response(2));
-        }
-        all.extend(designed.iter().step_by(11).cloned());
+        // Each is made only when those before it have not ended the search.
+        let core = LazyCell::new(|| starts::Core::new(self, longest, estimated, &designed, substeps));
+        let from_core = |make: fn(&starts::Core<'_>) -> Vec<Vec<f64>>| {
+            std::iter::once_with(|| core.as_ref()).flatten().flat_map(make)
+        };
+        let all = std::iter::once(user.to_vec())
+            .chain(from_core(|core| core.from_identification(1)))
+            .chain(from_core(|core| core.from_measured_response(2)))
+            .chain(designed.iter().step_by(11).cloned());
         self.search_from(all, &short, estimated, white, substeps)
     }
 
     /// The best of short searches from these starts, and the simulations that took.
     fn search_from(
         &self,
-        all: Vec<Vec<f64>>,
+        all: impl Iterator<Item = Vec<f64>>,
         short: &[Data],
         estimated: &[usize],
         white: &[NoiseModel],
