@@ -134,13 +134,18 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let count: u64 = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(20);
     let wanted = arguments.next().unwrap_or_default();
-    println!("{:16} {:>7} {:>6} {:>8} {:>12} {:>10}", "plant", "samples", "off", "reached", "simulations", "seconds");
+    println!(
+        "{:16} {:>7} {:>6} {:>6} {:>8} {:>12} {:>10}",
+        "plant", "samples", "off", "noise", "reached", "simulations", "seconds"
+    );
     let mut all = (0, 0, 0, 0.0);
     for plant in PLANTS.iter().filter(|p| p.name.contains(&wanted)) {
-        for (samples, off) in [(150, 3.0), (150, 10.0), (600, 10.0), (3000, 10.0)] {
+        for (samples, off, noise) in
+            [(150, 3.0, 0.05), (150, 10.0, 0.01), (150, 10.0, 0.2), (600, 30.0, 0.05), (3000, 10.0, 0.05)]
+        {
             let (mut cases, mut reached, mut simulations, mut seconds) = (0, 0, 0, 0.0);
             for seed in 1..=count {
-                let Some(case) = case(plant, samples, off, 0.05, seed) else { continue };
+                let Some(case) = case(plant, samples, off, noise, seed) else { continue };
                 let data = std::slice::from_ref(&case.data);
                 let settings = Settings { gls_rounds: 0, ..Settings::default() };
                 let from_truth = Settings { gls_rounds: 0, ..Settings::local(case.truth.clone()) };
@@ -156,7 +161,7 @@ fn main() {
             }
             let each = |x: f64| x / f64::from(cases.max(1));
             println!(
-                "{:16} {samples:7} {off:6} {:>5}/{:<3} {:11.1} {:10.4}",
+                "{:16} {samples:7} {off:6} {noise:6} {:>5}/{:<3} {:11.1} {:10.4}",
                 plant.name,
                 reached,
                 cases,

@@ -1,9 +1,11 @@
 //! Calibration: the parameters and initial states that make a simulation reproduce recordings, found globally in their bounds.
 //!
-//! A bad parameter must never pass for missing physics, so one local search is not enough: starts are the user's values, the
-//! linear core fitted to the measured frequency response, and a seeded design; from each, a homotopy leads from prediction
-//! (an observer holds the simulation near the measurement, which makes the landscape nearly convex) to the free run. The best
-//! is polished on all data. Coloured noise is weighted by an autoregression, in rounds of generalised least squares.
+//! A bad parameter must never pass for missing physics, so one local search is not enough: starts are the linear core fitted to
+//! transfer functions that are identified from the record (refined instrumental variables), the user's values, the linear core
+//! fitted to the measured frequency response, and a seeded design. The first are searched in free run; from each other one, a
+//! homotopy leads from prediction (an observer holds the simulation near the measurement, which makes the landscape nearly
+//! convex) to the free run. An error far below the signal, or two starts that agree on the best, end the search. The best is
+//! polished on all data. Coloured noise is weighted by an autoregression, in rounds of generalised least squares.
 //!
 //! A stretch that diverges has infinite cost. Nothing here draws a conclusion from what remains: it returns the residuals.
 
@@ -18,6 +20,8 @@ mod refined;
 mod search;
 mod settings;
 mod starts;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::DMatrix;
 

@@ -13,6 +13,12 @@ use crate::engine::Compiled;
 
 /// Samples on which starts are compared.
 const SHORT: usize = 3000;
+/// Strengths of the observer on the way to the free run, and the free run alone.
+pub(super) const HOMOTOPY: &[f64] = &[1.0, 0.1, 0.01, 0.0];
+const FREE_RUN: &[f64] = &[0.0];
+
+/// A start with the strengths of the observer on its way to the free run.
+pub(super) type Start = (Vec<f64>, &'static [f64]);
 
 impl Compiled {
     /// The parameters of the best start after a short search on part of the data, and the simulations that took.
@@ -29,21 +35,25 @@ impl Compiled {
         let Some(longest) = short.iter().max_by_key(|d| d.len()) else { return (None, 0) };
         let designed = starts::design(self, estimated, 64, settings.seed);
         // Each is made only when those before it have not ended the search.
-        let core = LazyCell::new(|| starts::Core::new(self, longest, estimated, &designed, substeps));
+        let core = LazyCell::new(|| starts::Core::new(self, longest, estimated, user, &designed, substeps));
         let from_core = |make: fn(&starts::Core<'_>) -> Vec<Vec<f64>>| {
             std::iter::once_with(|| core.as_ref()).flatten().flat_map(make)
         };
-        let all = std::iter::once(user.to_vec())
-            .chain(from_core(|core| core.from_identification(1)))
-            .chain(from_core(|core| core.from_measured_response(2)))
-            .chain(designed.iter().step_by(11).cloned());
+        let homotopy = if self.simulation().is_static() { FREE_RUN } else { HOMOTOPY };
+        // What the record itself says is near the minimum, if it is right, and needs no homotopy: 4 simulations where the user's
+        // values take 20.
+        let all = from_core(|core| core.from_identification(2))
+            .map(|theta| (theta, FREE_RUN))
+            .chain(std::iter::once((user.to_vec(), homotopy)))
+            .chain(from_core(|core| core.from_measured_response(2)).map(|theta| (theta, homotopy)))
+            .chain(designed.iter().step_by(11).map(|theta| (theta.clone(), homotopy)));
         self.search_from(all, &short, estimated, white, substeps)
     }
 
     /// The best of short searches from these starts, and the simulations that took.
-    fn search_from(
+    pub(super) fn search_from(
         &self,
-        all: impl Iterator<Item = Vec<f64>>,
+        all: impl Iterator<Item = Start>,
         short: &[Data],
         estimated: &[usize],
         white: &[NoiseModel],
@@ -53,8 +63,7 @@ impl Compiled {
         let mut simulations = 0;
         let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
         let samples: usize = short.iter().map(Data::len).sum::<usize>() * white.len();
-        let strengths: &[f64] = if self.simulation().is_static() { &[0.0] } else { &[1.0, 0.1, 0.01, 0.0] };
-        for theta in all {
+        for (theta, strengths) in all {
             let mut objective = Objective {
                 compiled: self,
                 data: short,

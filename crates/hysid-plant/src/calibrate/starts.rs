@@ -7,8 +7,8 @@ use rand_pcg::Pcg64Mcg;
 use super::Data;
 use super::frequency::{Line, measured_response, residuals};
 use super::least_squares::{Limits, Normal, minimise};
-use super::refined::identified_response;
-use crate::engine::{Compiled, Run};
+use super::refined::identification;
+use crate::engine::{Compiled, Linearisation, Run};
 
 /// Bounds of a variable, finite on both sides for drawing.
 fn drawing_range(value: f64, lower: f64, upper: f64) -> (f64, f64) {
@@ -58,11 +58,17 @@ pub(crate) fn design(compiled: &Compiled, estimated: &[usize], count: usize, see
         .collect()
 }
 
+/// Fewest and most fits of the core to a response.
+const FITS: (usize, usize) = (2, 8);
+/// Mean square of a fit's residuals below which no better one is looked for, by their own uncertainty.
+const KNOWN: f64 = 0.3;
+
 /// The linear core of a simulation, to be fitted to responses.
 pub(crate) struct Core<'a> {
     compiled: &'a Compiled,
     data: &'a Data,
     estimated: &'a [usize],
+    user: &'a [f64],
     designed: &'a [Vec<f64>],
     /// The operating point: states and inputs.
     point: (Vec<f64>, Vec<f64>),
@@ -74,73 +80,86 @@ impl<'a> Core<'a> {
         compiled: &'a Compiled,
         data: &'a Data,
         estimated: &'a [usize],
+        user: &'a [f64],
         designed: &'a [Vec<f64>],
         substeps: usize,
     ) -> Option<Self> {
         if compiled.simulation().is_static() || estimated.is_empty() {
             return None;
         }
-        let user = compiled.theta();
         let short = data.drive.shortened(1000);
-        let response = compiled.simulate(&Run::new(&short, &user).with_substeps(substeps));
+        let response = compiled.simulate(&Run::new(&short, user).with_substeps(substeps));
         let mean = |s: &Vec<f64>| s.iter().sum::<f64>() / s.len().max(1) as f64;
         let x: Vec<f64> = match response.diverged {
             None => response.states.iter().map(mean).collect(),
-            Some(_) => compiled.start_states(&user),
+            Some(_) => compiled.start_states(user),
         };
         let u: Vec<f64> = data.drive.inputs().iter().map(mean).collect();
-        Some(Self { compiled, data, estimated, designed, point: (x, u) })
+        Some(Self { compiled, data, estimated, user, designed, point: (x, u) })
     }
 
     /// Parameter sets for which the core fits the measured frequency response, best first; at most `count`.
     pub fn from_measured_response(&self, count: usize) -> Vec<Vec<f64>> {
-        self.fitted(&measured_response(self.compiled, self.data), count)
+        let lines = measured_response(self.compiled, self.data);
+        if lines.len() < 4 {
+            return Vec::new();
+        }
+        distinct(self.fitted(|theta| self.response_errors(&lines, theta), self.designed), count)
     }
 
     /// Parameter sets for which the core fits the transfer functions that are identified from the record, best first; at most
     /// `count`.
     pub fn from_identification(&self, count: usize) -> Vec<Vec<f64>> {
-        let user = self.compiled.theta();
-        let (x, u) = &self.point;
-        let at = |theta: &Vec<f64>| self.compiled.linearise(theta, x, u);
-        let linear: Vec<_> = std::iter::once(&user).chain(self.designed.iter().take(2)).map(at).collect();
-        self.fitted(&identified_response(self.compiled, self.data, &linear), count)
+        let tried = std::iter::once(self.user).chain(self.designed.iter().map(Vec::as_slice).take(2));
+        let linear: Vec<_> = tried.map(|theta| self.linear(theta)).collect();
+        let Some(found) = identification(self.compiled, self.data, &linear) else { return Vec::new() };
+        let lines = found.lines(self.compiled, self.data);
+        // Coefficients lead there from far away, the response weighs them right.
+        let near = self.fitted(|theta| found.coefficient_errors(&self.linear(theta)), self.designed);
+        let near = if near.is_empty() { self.designed.to_vec() } else { distinct(near, FITS.1) };
+        distinct(self.fitted(|theta| self.response_errors(&lines, theta), &near), count)
     }
 
-    fn fitted(&self, lines: &[Line], count: usize) -> Vec<Vec<f64>> {
-        if lines.len() < 4 {
-            return Vec::new();
-        }
-        let Self { compiled, estimated, designed, point: (x, u), .. } = self;
-        let user = compiled.theta();
-        let period = self.data.drive.period_s();
-        let at = |theta: &[f64]| residuals(compiled, lines, theta, x, u, period);
+    fn linear(&self, theta: &[f64]) -> Linearisation {
+        self.compiled.linearise(theta, &self.point.0, &self.point.1)
+    }
+
+    fn response_errors(&self, lines: &[Line], theta: &[f64]) -> Option<Vec<f64>> {
+        residuals(self.compiled, lines, theta, &self.point.0, &self.point.1, self.data.drive.period_s())
+    }
+
+    /// Fits with their costs, the user's values first, then from the closest of some others.
+    fn fitted(&self, at: impl Fn(&[f64]) -> Option<Vec<f64>>, others: &[Vec<f64>]) -> Vec<(f64, Vec<f64>)> {
         let cost = |theta: &[f64]| at(theta).map_or(f64::INFINITY, |r| 0.5 * r.iter().map(|e| e * e).sum::<f64>());
-        let mut ranked: Vec<(f64, &Vec<f64>)> =
-            std::iter::once(&user).chain(*designed).map(|theta| (cost(theta), theta)).collect();
+        let mut ranked: Vec<(f64, &[f64])> = others.iter().map(|theta| (cost(theta), theta.as_slice())).collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let parameters = compiled.parameters();
-        let bound = |upper: bool| -> Vec<f64> {
-            let all = estimated.iter().filter_map(|&i| parameters.get(i));
-            all.map(|p| if upper { p.upper() } else { p.lower() }).collect()
-        };
-        let (lower, upper) = (bound(false), bound(true));
+        let parameters = self.compiled.parameters();
+        let scales: Vec<Scale> =
+            self.estimated.iter().filter_map(|&i| parameters.get(i)).map(|p| Scale::of(p.lower(), p.upper())).collect();
+        let lower: Vec<f64> = scales.iter().map(|s| s.lower).collect();
+        let upper: Vec<f64> = scales.iter().map(|s| s.upper).collect();
+        // Fewer where one of them is as close as the response itself is known.
+        let known = at(self.user).map_or(0.0, |r| KNOWN * 0.5 * r.len() as f64);
         let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
-        for (_, theta) in ranked.into_iter().take(4) {
+        let tried = std::iter::once(self.user).chain(ranked.into_iter().map(|(_, theta)| theta));
+        for (done, theta) in tried.take(FITS.1).enumerate() {
+            if done >= FITS.0 && found.iter().any(|(cost, _)| *cost < known) {
+                break;
+            }
             let whole = |p: &[f64]| {
-                let mut whole = theta.clone();
-                for (&i, value) in estimated.iter().zip(p) {
-                    whole[i] = *value;
+                let mut whole = theta.to_vec();
+                for ((&i, value), scale) in self.estimated.iter().zip(p).zip(&scales) {
+                    whole[i] = scale.value(*value);
                 }
                 whole
             };
-            let start: Vec<f64> = estimated.iter().map(|&i| theta[i]).collect();
+            let start: Vec<f64> = self.estimated.iter().zip(&scales).map(|(&i, s)| s.variable(theta[i])).collect();
             let evaluate = |p: &[f64]| {
-                let base = at(&whole(p))?;
+                let base = at(&whole(p)).filter(|r| !r.is_empty())?;
                 let mut columns = Vec::with_capacity(p.len());
                 for k in 0..p.len() {
                     // Inwards at a bound.
-                    let size = 1e-5 * p[k].abs().max(1e-6);
+                    let size = if scales[k].logarithmic { 1e-5 } else { 1e-5 * p[k].abs().max(1e-6) };
                     let eps = if p[k] + size > upper[k] { -size } else { size };
                     let mut moved = p.to_vec();
                     moved[k] += eps;
@@ -153,21 +172,57 @@ impl<'a> Core<'a> {
                 normal.add(&base, &columns, &index);
                 Some(normal)
             };
-            let limits = Limits { iterations: 15, tolerance: 1e-3 };
+            let limits = Limits { iterations: 25, tolerance: 1e-3 };
             if let Some(minimum) = minimise(&start, &lower, &upper, limits, evaluate) {
                 found.push((minimum.normal.cost, whole(&minimum.p)));
             }
         }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut distinct: Vec<Vec<f64>> = Vec::new();
-        for (_, theta) in found {
-            if !distinct.iter().any(|known| same(known, &theta)) {
-                distinct.push(theta);
-            }
-        }
-        distinct.truncate(count);
-        distinct
+        found
     }
+}
+
+/// How a parameter varies in a fit: by its logarithm where its bounds are above 0.
+struct Scale {
+    logarithmic: bool,
+    lower: f64,
+    upper: f64,
+}
+
+impl Scale {
+    fn of(lower: f64, upper: f64) -> Self {
+        let logarithmic = lower > 0.0;
+        if logarithmic {
+            Self { logarithmic, lower: lower.ln(), upper: upper.ln() }
+        } else {
+            Self { logarithmic, lower, upper }
+        }
+    }
+
+    fn variable(&self, value: f64) -> f64 {
+        if self.logarithmic { value.ln() } else { value }
+    }
+
+    fn value(&self, variable: f64) -> f64 {
+        if self.logarithmic { variable.exp() } else { variable }
+    }
+}
+
+/// The best of some fits that differ, at most `count`; where parameters are not settled one by one, the first comes first,
+/// which began at the user's values.
+fn distinct(mut found: Vec<(f64, Vec<f64>)>, count: usize) -> Vec<Vec<f64>> {
+    let least = found.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
+    if let Some((cost, _)) = found.first_mut().filter(|(cost, _)| *cost <= 1.05 * least) {
+        *cost = least;
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut distinct: Vec<Vec<f64>> = Vec::new();
+    for (_, theta) in found {
+        if !distinct.iter().any(|known| same(known, &theta)) {
+            distinct.push(theta);
+        }
+    }
+    distinct.truncate(count);
+    distinct
 }
 
 /// Whether two parameter sets agree to 2 %.

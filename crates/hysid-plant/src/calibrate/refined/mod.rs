@@ -2,7 +2,7 @@
 //! time.
 //!
 //! The linearised equations give the form of the transfer functions (`structure.rs`), the record their coefficients
-//! (`estimate.rs`), and the linear core is fitted to these by the same distance as to a measured frequency response. Against
+//! (`estimate.rs`), and the linear core is fitted to these, then by the same distance as to a measured frequency response. Against
 //! that response the coefficients have no windows: a record of a few periods will do, and noise on the output, whatever its
 //! colour, leaves them without bias.
 //! References: P. Young, A. Jakeman, Refined instrumental variable methods of recursive time-series analysis, Part III, Int. J.
@@ -21,10 +21,10 @@ use super::frequency::{C, Line, hold_response};
 use crate::engine::{Compiled, Linearisation};
 use estimate::{Model, Record, keep};
 use filter::roots;
-use structure::{Structure, structures};
+use structure::{Structure, coefficients, structures};
 
 /// Lines at which the transfer functions are told, beside those at resonances.
-const LINES: usize = 64;
+const LINES: usize = 40;
 /// Fewest samples for each unknown.
 const FOR_EACH: usize = 5;
 /// Iterations from every start, and from the best of them.
@@ -33,36 +33,78 @@ const ITERATIONS: (usize, usize) = (4, 30);
 /// The transfer functions to one output, in a unit of time of their own.
 struct Identified {
     model: Model,
+    /// The states whose equations they belong to, if they are all there.
+    states: Vec<usize>,
     /// The unit of time in seconds.
     unit_s: f64,
 }
 
-/// Identified transfer functions as lines of a frequency response with their certainty; empty where nothing was identified.
+/// The transfer functions that were identified from a record, to each output where that succeeded.
+pub(crate) struct Identification {
+    outputs: Vec<Option<Identified>>,
+    inputs: usize,
+}
+
+/// Identifies the linear core; `None` where no output allows it.
 ///
 /// `linear` holds the linearised equations at the user's values first, and at others. Outputs with gaps are left out.
-pub(crate) fn identified_response(compiled: &Compiled, data: &Data, linear: &[Linearisation]) -> Vec<Line> {
+pub(crate) fn identification(compiled: &Compiled, data: &Data, linear: &[Linearisation]) -> Option<Identification> {
     let inputs = data.drive.inputs().len();
     if inputs == 0 || data.is_empty() {
-        return Vec::new();
+        return None;
     }
-    let period = data.drive.period_s();
-    let all: Vec<Option<Identified>> = (0..data.measured.len()).map(|j| identify(compiled, data, linear, j)).collect();
-    if all.iter().all(Option::is_none) {
-        return Vec::new();
+    let outputs: Vec<_> = (0..data.measured.len()).map(|j| identify(compiled, data, linear, j)).collect();
+    outputs.iter().any(Option::is_some).then_some(Identification { outputs, inputs })
+}
+
+impl Identification {
+    /// As lines of a frequency response with their certainty.
+    pub fn lines(&self, compiled: &Compiled, data: &Data) -> Vec<Line> {
+        let period = data.drive.period_s();
+        let line = |omega: f64| {
+            let hold = hold_response(compiled.hold(), omega * period);
+            let mut response = Vec::with_capacity(self.outputs.len() * self.inputs);
+            for identified in &self.outputs {
+                match identified {
+                    Some(found) => response.extend((0..self.inputs).map(|i| found.at(i, omega, hold))),
+                    None => response.extend(std::iter::repeat_n((C::new(0.0, 0.0), 0.0), self.inputs)),
+                }
+            }
+            Line { omega, response }
+        };
+        frequencies(&self.outputs, period, data.len()).into_iter().map(line).collect()
     }
-    let frequencies = frequencies(&all, period, data.len());
-    let line = |omega: f64| {
-        let hold = hold_response(compiled.hold(), omega * period);
-        let mut response = Vec::with_capacity(all.len() * inputs);
-        for identified in &all {
-            match identified {
-                Some(found) => response.extend((0..inputs).map(|i| found.at(i, omega, hold))),
-                None => response.extend(std::iter::repeat_n((C::new(0.0, 0.0), 0.0), inputs)),
+
+    /// The logarithms of the coefficients of linearised equations by those identified, each by its certainty; `None` where
+    /// they are not finite.
+    ///
+    /// Where parameters are factors of terms, logarithms of coefficients change evenly with logarithms of parameters, and a
+    /// search is not caught between resonances as it is in the distance between responses.
+    pub fn coefficient_errors(&self, linear: &Linearisation) -> Option<Vec<f64>> {
+        let mut out = Vec::new();
+        for (j, found) in self.outputs.iter().enumerate() {
+            let Some(found) = found.as_ref().filter(|f| !f.states.is_empty()) else { continue };
+            let (a, b) = coefficients(linear, j, &found.states, found.unit_s);
+            let model = &found.model;
+            let free = |a: &[f64]| a.get(model.integrators..).unwrap_or_default().to_vec();
+            let mut pairs: Vec<(f64, f64)> = free(&a).into_iter().zip(free(&model.a)).collect();
+            for (own, given) in b.iter().zip(&model.b) {
+                pairs.extend(own.iter().copied().zip(given.iter().copied()));
+            }
+            let unknowns = pairs.len();
+            for (k, (own, given)) in pairs.into_iter().enumerate() {
+                let deviation = model.covariance.get(k + k * unknowns).copied().unwrap_or(f64::NAN).max(0.0).sqrt();
+                let certainty = (given.abs() / deviation.max(f64::MIN_POSITIVE)).min(10.0);
+                if !own.is_finite() {
+                    return None;
+                }
+                if certainty >= 2.0 {
+                    out.push(certainty * (own / given).max(1e-4).ln().min(10.0));
+                }
             }
         }
-        Line { omega, response }
-    };
-    frequencies.into_iter().map(line).collect()
+        Some(out)
+    }
 }
 
 /// Frequencies evenly in their logarithm from one period in the record to the Nyquist frequency, and about each resonance.
@@ -108,7 +150,7 @@ fn identify(compiled: &Compiled, data: &Data, linear: &[Linearisation], j: usize
             let bic = samples as f64 * model.variance.max(f64::MIN_POSITIVE).ln()
                 + model.unknowns() as f64 * (samples as f64).ln();
             if best.as_ref().is_none_or(|(least, _)| bic < *least) {
-                best = Some((bic, Identified { model, unit_s }));
+                best = Some((bic, Identified { model, states: structure.states.clone(), unit_s }));
             }
         }
     }

@@ -15,6 +15,8 @@ const HIGHEST: usize = 8;
 /// The form of the transfer functions from all inputs to one output.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Structure {
+    /// The states between inputs and output; empty where some of them are too fast to be identified.
+    pub states: Vec<usize>,
     /// Number of poles.
     pub order: usize,
     /// How many of them are at 0.
@@ -78,11 +80,18 @@ pub(super) fn structures(linear: &[Linearisation], j: usize, period: f64, durati
     let at_rest = |all: &[Complex<f64>]| all.iter().filter(|p| p.norm() * duration < 1e-3).count();
     let Some(own) = poles(first) else { return Vec::new() };
     let integrators = linear.iter().filter_map(poles).map(|all| at_rest(&all)).min().unwrap_or(0);
-    let whole = Structure { order, integrators, degrees, poles: own.get(integrators..).unwrap_or_default().to_vec() };
+    let whole = Structure {
+        states: kept.clone(),
+        order,
+        integrators,
+        degrees,
+        poles: own.get(integrators..).unwrap_or_default().to_vec(),
+    };
     let fast = whole.poles.iter().filter(|p| p.norm() * period > std::f64::consts::PI).count();
     let mut all = vec![whole];
     if fast > 0 && fast < order {
         let mut reduced = all[0].clone();
+        reduced.states.clear();
         reduced.order -= fast;
         reduced.poles.truncate(reduced.poles.len() - fast);
         for degree in reduced.degrees.iter_mut().flatten() {
@@ -91,4 +100,36 @@ pub(super) fn structures(linear: &[Linearisation], j: usize, period: f64, durati
         all.push(reduced);
     }
     all
+}
+
+/// Denominator (without its leading 1) and the numerators from all inputs to output `j`, lowest power first, of the linearised
+/// equations of some states; time in units of `unit_s`. By Faddeev and Le Verrier.
+pub(super) fn coefficients(
+    linear: &Linearisation,
+    j: usize,
+    states: &[usize],
+    unit_s: f64,
+) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let (n, all) = (states.len(), linear.flow.len());
+    let inputs = if all > 0 { linear.b.len() / all } else { 0 };
+    let a = DMatrix::from_fn(n, n, |r, c| linear.a[states[r] * all + states[c]] * unit_s);
+    let b = DMatrix::from_fn(n, inputs, |r, i| linear.b[states[r] * inputs + i] * unit_s);
+    let c = DMatrix::from_fn(1, n, |_, s| linear.c[j * all + states[s]]);
+    let mut denominator = vec![0.0; n];
+    let mut numerators = vec![vec![0.0; n + 1]; inputs];
+    // The adjoint of s - A has this matrix at the power n - k.
+    let mut adjoint = DMatrix::zeros(n, n);
+    let mut leading = 1.0;
+    for k in 1..=n {
+        adjoint = &a * adjoint + DMatrix::identity(n, n) * leading;
+        leading = -(&a * &adjoint).trace() / k as f64;
+        denominator[n - k] = leading;
+        let through = &c * &adjoint * &b;
+        for (i, numerator) in numerators.iter_mut().enumerate() {
+            let direct = linear.d[j * inputs + i];
+            numerator[n - k] = through[(0, i)] + direct * leading;
+            numerator[n] = direct;
+        }
+    }
+    (denominator, numerators)
 }

@@ -12,7 +12,7 @@ use crate::document::Hold;
 /// `s^2 + 2 zeta w s + w^2` and `gain w^2`, as a structure with the user's poles a factor off.
 fn resonant(off: f64) -> Structure {
     let pole = Complex::new(-0.05, 1.0) * (8.0 * off);
-    Structure { order: 2, integrators: 0, degrees: vec![Some(0)], poles: vec![pole, pole.conj()] }
+    Structure { states: vec![0, 1], order: 2, integrators: 0, degrees: vec![Some(0)], poles: vec![pole, pole.conj()] }
 }
 
 fn steps(n: usize, seed: u64) -> Vec<f64> {
@@ -97,8 +97,13 @@ fn a_clean_record_gives_the_coefficients() {
 #[test]
 fn an_integrating_plant_keeps_its_integrator() {
     let (a, b) = ([0.0, 2.5], [4.0]);
-    let structure =
-        Structure { order: 2, integrators: 1, degrees: vec![Some(0)], poles: vec![Complex::new(-20.0, 0.0)] };
+    let structure = Structure {
+        states: vec![0, 1],
+        order: 2,
+        integrators: 1,
+        degrees: vec![Some(0)],
+        poles: vec![Complex::new(-20.0, 0.0)],
+    };
     let u = steps(250, 8);
     let y = respond(&a, &b, &u, Hold::Zero, 0.02, &[0.4, 0.1]);
     let record = Record { inputs: std::slice::from_ref(&u), output: &y, hold: Hold::Zero, period: 0.02 };
