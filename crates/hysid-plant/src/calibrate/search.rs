@@ -7,6 +7,7 @@ use super::least_squares::{Limits, minimise};
 use super::noise::NoiseModel;
 use super::objective::Objective;
 use super::observer::rms_about_mean;
+use super::refined::Attained;
 use super::settings::Settings;
 use super::starts;
 use crate::engine::Compiled;
@@ -17,8 +18,34 @@ const SHORT: usize = 3000;
 pub(super) const HOMOTOPY: &[f64] = &[1.0, 0.1, 0.01, 0.0];
 const FREE_RUN: &[f64] = &[0.0];
 
-/// A start with the strengths of the observer on its way to the free run.
-pub(super) type Start = (Vec<f64>, &'static [f64]);
+/// Where a search begins, and how it goes on.
+pub(super) struct Start {
+    pub theta: Vec<f64>,
+    /// Strengths of the observer on the way to the free run.
+    pub strengths: &'static [f64],
+    /// Whether it comes from the identification.
+    pub identified: bool,
+    /// What a linear model with free coefficients attains on the outputs, where that is known.
+    pub linear: Option<Vec<Attained>>,
+}
+
+impl Start {
+    pub fn new(theta: Vec<f64>, strengths: &'static [f64]) -> Self {
+        Self { theta, strengths, identified: false, linear: None }
+    }
+
+    /// Whether a cost is that of the linear model: the core is linear then, and no other parameters can do better. `None` of
+    /// several stretches, of which only one was identified.
+    fn is_explained(&self, cost: f64, data: &[Data], noise: &[NoiseModel]) -> bool {
+        let (Some(linear), [data]) = (&self.linear, data) else { return false };
+        let samples = data.len() as f64;
+        let sum = |f: &dyn Fn(&Attained) -> f64| -> f64 {
+            linear.iter().zip(noise).map(|(a, n)| 0.5 * samples * f(a) / (n.sigma * n.sigma)).sum()
+        };
+        let by_chance = |a: &Attained| a.mean_square * (1.0 + 2.0 * a.unknowns as f64 / samples);
+        cost >= 0.95 * sum(&|a| a.mean_square) && cost <= sum(&by_chance)
+    }
+}
 
 impl Compiled {
     /// The parameters of the best start after a short search on part of the data, and the simulations that took.
@@ -36,17 +63,25 @@ impl Compiled {
         let designed = starts::design(self, estimated, 64, settings.seed);
         // Each is made only when those before it have not ended the search.
         let core = LazyCell::new(|| starts::Core::new(self, longest, estimated, user, &designed, substeps));
-        let from_core = |make: fn(&starts::Core<'_>) -> Vec<Vec<f64>>| {
-            std::iter::once_with(|| core.as_ref()).flatten().flat_map(make)
-        };
         let homotopy = if self.simulation().is_static() { FREE_RUN } else { HOMOTOPY };
         // What the record itself says is near the minimum, if it is right, and needs no homotopy: 4 simulations where the user's
         // values take 20.
-        let all = from_core(|core| core.from_identification(2))
-            .map(|theta| (theta, FREE_RUN))
-            .chain(std::iter::once((user.to_vec(), homotopy)))
-            .chain(from_core(|core| core.from_measured_response(2)).map(|theta| (theta, homotopy)))
-            .chain(designed.iter().step_by(11).map(|theta| (theta.clone(), homotopy)));
+        let identified = |core: &starts::Core<'_>| {
+            let (found, linear) = core.from_identification(2);
+            found.into_iter().map(move |theta| Start {
+                theta,
+                strengths: FREE_RUN,
+                identified: true,
+                linear: linear.clone(),
+            })
+        };
+        let measured = |core: &starts::Core<'_>| core.from_measured_response(2);
+        let lazily = || std::iter::once_with(|| core.as_ref()).flatten();
+        let all = lazily()
+            .flat_map(identified)
+            .chain(std::iter::once_with(|| Start::new(user.to_vec(), homotopy)))
+            .chain(lazily().flat_map(measured).map(|theta| Start::new(theta, homotopy)))
+            .chain(designed.iter().step_by(11).map(|theta| Start::new(theta.clone(), homotopy)));
         self.search_from(all, &short, estimated, white, substeps)
     }
 
@@ -62,21 +97,23 @@ impl Compiled {
         let (lower, upper) = self.box_of(short, estimated);
         let mut simulations = 0;
         let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
+        // Starts from one identification are no witnesses for each other.
+        let mut witnesses = 0;
         let samples: usize = short.iter().map(Data::len).sum::<usize>() * white.len();
-        for (theta, strengths) in all {
+        for start in all {
             let mut objective = Objective {
                 compiled: self,
                 data: short,
                 estimated,
-                theta: theta.clone(),
+                theta: start.theta.clone(),
                 substeps,
                 noise: white.to_vec(),
                 gains: None,
                 simulations: 0,
             };
-            let mut p = self.point(short, estimated, &theta, None);
+            let mut p = self.point(short, estimated, &start.theta, None);
             let mut best = f64::INFINITY;
-            for &strength in strengths {
+            for &strength in start.strengths {
                 let now = objective.theta(&p);
                 let initial = objective.initial(&p);
                 objective.gains = (strength > 0.0).then(|| {
@@ -99,13 +136,16 @@ impl Compiled {
             simulations += objective.simulations;
             if best.is_finite() {
                 let theta = objective.theta(&p);
-                // Two starts that agree on the best so far, or an error far below the signal, end the search.
+                // Two starts that agree on the best so far, an error far below the signal, or as little as a linear model with
+                // free coefficients leaves, end the search.
                 let agreed =
                     found.iter().any(|(cost, known)| (best - cost).abs() <= 0.01 * cost && starts::same(known, &theta));
                 let least = found.iter().map(|(c, _)| *c).fold(best, f64::min);
                 found.push((best, theta));
+                witnesses += usize::from(!start.identified);
                 let relative = (2.0 * least / samples as f64).sqrt();
-                if best <= 1.01 * least && (relative < 0.03 || (agreed && found.len() >= 2)) {
+                let explained = start.is_explained(best, short, white);
+                if best <= 1.01 * least && (relative < 0.03 || explained || (agreed && witnesses > 0)) {
                     break;
                 }
             }

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use super::Data;
 use super::frequency::{Line, measured_response, residuals};
 use super::least_squares::{Limits, Normal, minimise};
-use super::refined::identification;
+use super::refined::{Attained, identification};
 use crate::engine::{Compiled, Linearisation, Run};
 
 /// Bounds of a variable, finite on both sides for drawing.
@@ -72,6 +72,8 @@ pub(crate) struct Core<'a> {
     designed: &'a [Vec<f64>],
     /// The operating point: states and inputs.
     point: (Vec<f64>, Vec<f64>),
+    /// Another one, at the highest values.
+    edge: (Vec<f64>, Vec<f64>),
 }
 
 impl<'a> Core<'a> {
@@ -90,12 +92,15 @@ impl<'a> Core<'a> {
         let short = data.drive.shortened(1000);
         let response = compiled.simulate(&Run::new(&short, user).with_substeps(substeps));
         let mean = |s: &Vec<f64>| s.iter().sum::<f64>() / s.len().max(1) as f64;
-        let x: Vec<f64> = match response.diverged {
-            None => response.states.iter().map(mean).collect(),
-            Some(_) => compiled.start_states(user),
+        let at = |value: &dyn Fn(&Vec<f64>) -> f64| -> (Vec<f64>, Vec<f64>) {
+            let x = match response.diverged {
+                None => response.states.iter().map(value).collect(),
+                Some(_) => compiled.start_states(user),
+            };
+            (x, data.drive.inputs().iter().map(value).collect())
         };
-        let u: Vec<f64> = data.drive.inputs().iter().map(mean).collect();
-        Some(Self { compiled, data, estimated, user, designed, point: (x, u) })
+        let highest = |s: &Vec<f64>| s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Some(Self { compiled, data, estimated, user, designed, point: at(&mean), edge: at(&highest) })
     }
 
     /// Parameter sets for which the core fits the measured frequency response, best first; at most `count`.
@@ -107,17 +112,40 @@ impl<'a> Core<'a> {
         distinct(self.fitted(|theta| self.response_errors(&lines, theta), self.designed), count)
     }
 
-    /// Parameter sets for which the core fits the transfer functions that are identified from the record, best first; at most
-    /// `count`.
-    pub fn from_identification(&self, count: usize) -> Vec<Vec<f64>> {
+    /// Parameter sets for which the core fits the transfer functions that are identified from the record, best first, at most
+    /// `count`; with what those transfer functions leave of the outputs where there is nothing beside the
+    /// core.
+    pub fn from_identification(&self, count: usize) -> (Vec<Vec<f64>>, Option<Vec<Attained>>) {
         let tried = std::iter::once(self.user).chain(self.designed.iter().map(Vec::as_slice).take(2));
         let linear: Vec<_> = tried.map(|theta| self.linear(theta)).collect();
-        let Some(found) = identification(self.compiled, self.data, &linear) else { return Vec::new() };
+        let Some(found) = identification(self.compiled, self.data, &linear) else {
+            return (Vec::new(), None);
+        };
         let lines = found.lines(self.compiled, self.data);
         // Coefficients lead there from far away, the response weighs them right.
         let near = self.fitted(|theta| found.coefficient_errors(&self.linear(theta)), self.designed);
         let near = if near.is_empty() { self.designed.to_vec() } else { distinct(near, FITS.1) };
-        distinct(self.fitted(|theta| self.response_errors(&lines, theta), &near), count)
+        (
+            distinct(self.fitted(|theta| self.response_errors(&lines, theta), &near), count),
+            found.attained().filter(|_| self.is_all()),
+        )
+    }
+
+    /// Whether the core is the whole simulation, as far as can be seen: the same everywhere, and moved by every parameter.
+    fn is_all(&self) -> bool {
+        let matrices = |theta: &[f64], (x, u): &(Vec<f64>, Vec<f64>)| {
+            let l = self.compiled.linearise(theta, x, u);
+            [l.a, l.b, l.c, l.d].concat()
+        };
+        let own = matrices(self.user, &self.point);
+        let differs =
+            |other: &[f64]| own.iter().zip(other).any(|(a, b)| !((a - b).abs() <= 1e-9 * a.abs().max(b.abs())));
+        let moves = |&i: &usize| {
+            let mut theta = self.user.to_vec();
+            theta[i] = if theta[i] == 0.0 { 1.0 } else { 1.001 * theta[i] };
+            differs(&matrices(&theta, &self.point))
+        };
+        !differs(&matrices(self.user, &self.edge)) && self.estimated.iter().all(moves)
     }
 
     fn linear(&self, theta: &[f64]) -> Linearisation {

@@ -4,7 +4,7 @@ use hysid_signal::{Excitation, white_noise};
 
 use super::noise::NoiseModel;
 use super::observer::rms_about_mean;
-use super::search::HOMOTOPY;
+use super::search::{HOMOTOPY, Start};
 use super::starts::{Core, design};
 use super::{Data, Settings};
 use crate::document::Simulation;
@@ -62,7 +62,7 @@ fn start(compiled: &Compiled, data: &Data) -> Vec<f64> {
     let (estimated, user) = (compiled.estimated(), compiled.theta());
     let designed = design(compiled, &estimated, 64, 1);
     let core = Core::new(compiled, data, &estimated, &user, &designed, 2).expect("linear");
-    core.from_identification(1).swap_remove(0)
+    core.from_identification(1).0.swap_remove(0)
 }
 
 fn assert_close(found: &[f64], truth: &[f64], relative: f64) {
@@ -84,7 +84,7 @@ fn a_short_record_calibrates_from_far_away_with_this_start_and_not_without() {
         let designed = design(&compiled, &estimated, 64, 1);
         let core = Core::new(&compiled, &data, &estimated, &user, &designed, 1).expect("linear");
         let others = core.from_measured_response(2).into_iter().chain(designed.iter().step_by(11).cloned());
-        let all = std::iter::once(user.clone()).chain(others).map(|theta| (theta, HOMOTOPY));
+        let all = std::iter::once(user.clone()).chain(others).map(|theta| Start::new(theta, HOMOTOPY));
         let white = [NoiseModel::white(measured)];
         let (best, _) = compiled.search_from(all, std::slice::from_ref(&data), &estimated, &white, 1);
         let local = Settings { gls_rounds: 0, ..Settings::local(best.expect("finite")) };
@@ -182,5 +182,5 @@ fn a_gap_in_the_measurement_gives_no_start() {
     data.measured[0][100] = f64::NAN;
     let (estimated, user) = (compiled.estimated(), compiled.theta());
     let core = Core::new(&compiled, &data, &estimated, &user, &[], 1).expect("linear");
-    assert!(core.from_identification(1).is_empty());
+    assert!(core.from_identification(1).0.is_empty());
 }

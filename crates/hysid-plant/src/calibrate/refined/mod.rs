@@ -39,6 +39,15 @@ struct Identified {
     unit_s: f64,
 }
 
+/// How far a linear model with free coefficients follows one output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Attained {
+    /// Mean square of its residual.
+    pub mean_square: f64,
+    /// Its free coefficients.
+    pub unknowns: usize,
+}
+
 /// The transfer functions that were identified from a record, to each output where that succeeded.
 pub(crate) struct Identification {
     outputs: Vec<Option<Identified>>,
@@ -58,6 +67,16 @@ pub(crate) fn identification(compiled: &Compiled, data: &Data, linear: &[Lineari
 }
 
 impl Identification {
+    /// Each output's mean square residual under free coefficients, and what fewer of them may add to it by chance; `None` where
+    /// not every output was identified.
+    pub fn attained(&self) -> Option<Vec<Attained>> {
+        let each = |found: &Option<Identified>| {
+            let model = &found.as_ref()?.model;
+            Some(Attained { mean_square: model.variance, unknowns: model.unknowns() })
+        };
+        self.outputs.iter().map(each).collect()
+    }
+
     /// As lines of a frequency response with their certainty.
     pub fn lines(&self, compiled: &Compiled, data: &Data) -> Vec<Line> {
         let period = data.drive.period_s();
