@@ -32,7 +32,7 @@ pub(crate) fn measured_response(compiled: &Compiled, data: &Data) -> Vec<Line> {
     if m == 0 || n < 128 {
         return Vec::new();
     }
-    let segment = (n / (2 + m)).min(4096).max(64);
+    let segment = (n / (2 + m)).clamp(64, 4096);
     let cut = |s: &'_ [f64]| s.get(..n).unwrap_or(s).to_vec();
     let inputs: Vec<Vec<f64>> = data.drive.inputs().iter().map(|s| cut(s)).collect();
     let outputs: Vec<Vec<f64>> = data.measured.iter().map(|s| cut(s)).collect();

@@ -67,7 +67,7 @@ impl Compiled {
         // What the record itself says is near the minimum, if it is right, and needs no homotopy: 4 simulations where the user's
         // values take 20.
         let identified = |core: &starts::Core<'_>| {
-            let (found, linear) = core.from_identification(2);
+            let (found, linear) = core.by_identification(2);
             found.into_iter().map(move |theta| Start {
                 theta,
                 strengths: FREE_RUN,
@@ -75,7 +75,7 @@ impl Compiled {
                 linear: linear.clone(),
             })
         };
-        let measured = |core: &starts::Core<'_>| core.from_measured_response(2);
+        let measured = |core: &starts::Core<'_>| core.by_measured_response(2);
         let lazily = || std::iter::once_with(|| core.as_ref()).flatten();
         let all = lazily()
             .flat_map(identified)

@@ -104,7 +104,7 @@ impl<'a> Core<'a> {
     }
 
     /// Parameter sets for which the core fits the measured frequency response, best first; at most `count`.
-    pub fn from_measured_response(&self, count: usize) -> Vec<Vec<f64>> {
+    pub fn by_measured_response(&self, count: usize) -> Vec<Vec<f64>> {
         let lines = measured_response(self.compiled, self.data);
         if lines.len() < 4 {
             return Vec::new();
@@ -115,7 +115,7 @@ impl<'a> Core<'a> {
     /// Parameter sets for which the core fits the transfer functions that are identified from the record, best first, at most
     /// `count`; with what those transfer functions leave of the outputs where there is nothing beside the
     /// core.
-    pub fn from_identification(&self, count: usize) -> (Vec<Vec<f64>>, Option<Vec<Attained>>) {
+    pub fn by_identification(&self, count: usize) -> (Vec<Vec<f64>>, Option<Vec<Attained>>) {
         let tried = std::iter::once(self.user).chain(self.designed.iter().map(Vec::as_slice).take(2));
         let linear: Vec<_> = tried.map(|theta| self.linear(theta)).collect();
         let Some(found) = identification(self.compiled, self.data, &linear) else {
@@ -138,8 +138,9 @@ impl<'a> Core<'a> {
             [l.a, l.b, l.c, l.d].concat()
         };
         let own = matrices(self.user, &self.point);
-        let differs =
-            |other: &[f64]| own.iter().zip(other).any(|(a, b)| !((a - b).abs() <= 1e-9 * a.abs().max(b.abs())));
+        let differs = |other: &[f64]| {
+            own.iter().zip(other).any(|(a, b)| a.is_nan() || b.is_nan() || (a - b).abs() > 1e-9 * a.abs().max(b.abs()))
+        };
         let moves = |&i: &usize| {
             let mut theta = self.user.to_vec();
             theta[i] = if theta[i] == 0.0 { 1.0 } else { 1.001 * theta[i] };

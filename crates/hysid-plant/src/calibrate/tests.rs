@@ -62,7 +62,7 @@ fn start(compiled: &Compiled, data: &Data) -> Vec<f64> {
     let (estimated, user) = (compiled.estimated(), compiled.theta());
     let designed = design(compiled, &estimated, 64, 1);
     let core = Core::new(compiled, data, &estimated, &user, &designed, 2).expect("linear");
-    core.from_identification(1).0.swap_remove(0)
+    core.by_identification(1).0.swap_remove(0)
 }
 
 fn assert_close(found: &[f64], truth: &[f64], relative: f64) {
@@ -83,7 +83,7 @@ fn a_short_record_calibrates_from_far_away_with_this_start_and_not_without() {
         let (estimated, user) = (compiled.estimated(), compiled.theta());
         let designed = design(&compiled, &estimated, 64, 1);
         let core = Core::new(&compiled, &data, &estimated, &user, &designed, 1).expect("linear");
-        let others = core.from_measured_response(2).into_iter().chain(designed.iter().step_by(11).cloned());
+        let others = core.by_measured_response(2).into_iter().chain(designed.iter().step_by(11).cloned());
         let all = std::iter::once(user.clone()).chain(others).map(|theta| Start::new(theta, HOMOTOPY));
         let white = [NoiseModel::white(measured)];
         let (best, _) = compiled.search_from(all, std::slice::from_ref(&data), &estimated, &white, 1);
@@ -182,5 +182,5 @@ fn a_gap_in_the_measurement_gives_no_start() {
     data.measured[0][100] = f64::NAN;
     let (estimated, user) = (compiled.estimated(), compiled.theta());
     let core = Core::new(&compiled, &data, &estimated, &user, &[], 1).expect("linear");
-    assert!(core.from_identification(1).0.is_empty());
+    assert!(core.by_identification(1).0.is_empty());
 }

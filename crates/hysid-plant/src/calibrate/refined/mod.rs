@@ -191,10 +191,10 @@ fn from_starts(structure: &Structure, record: Record<'_>) -> Option<Model> {
         if samples < FOR_EACH * model.unknowns() {
             return None;
         }
-        if let Some(found) = model.refined(record, ITERATIONS.0) {
-            if best.as_ref().is_none_or(|b| found.variance < b.variance) {
-                best = Some(found);
-            }
+        if let Some(found) = model.refined(record, ITERATIONS.0)
+            && best.as_ref().is_none_or(|b| found.variance < b.variance)
+        {
+            best = Some(found);
         }
     }
     best?.refined(record, ITERATIONS.1)

@@ -42,7 +42,7 @@ impl Structure {
 pub(super) fn structures(linear: &[Linearisation], j: usize, period: f64, duration: f64) -> Vec<Structure> {
     let Some(first) = linear.first() else { return Vec::new() };
     let n = first.flow.len();
-    let inputs = if n > 0 { first.b.len() / n } else { 0 };
+    let inputs = first.b.len().checked_div(n).unwrap_or(0);
     let any = |f: &dyn Fn(&Linearisation) -> f64| linear.iter().any(|l| f(l) != 0.0);
     // Steps from a state to the output: the states of the output itself are one away.
     let mut away: Vec<Option<usize>> = (0..n).map(|s| any(&|l| l.c[j * n + s]).then_some(1)).collect();
@@ -111,7 +111,7 @@ pub(super) fn coefficients(
     unit_s: f64,
 ) -> (Vec<f64>, Vec<Vec<f64>>) {
     let (n, all) = (states.len(), linear.flow.len());
-    let inputs = if all > 0 { linear.b.len() / all } else { 0 };
+    let inputs = linear.b.len().checked_div(all).unwrap_or(0);
     let a = DMatrix::from_fn(n, n, |r, c| linear.a[states[r] * all + states[c]] * unit_s);
     let b = DMatrix::from_fn(n, inputs, |r, i| linear.b[states[r] * inputs + i] * unit_s);
     let c = DMatrix::from_fn(1, n, |_, s| linear.c[j * all + states[s]]);
