@@ -64,10 +64,7 @@ fn rivals_of<'c>(effect: &Effect, candidates: &'c [Candidate]) -> Vec<&'c Candid
 ///
 /// `given` are statements that were heard to the end.
 pub fn unheard<'c>(pool: &[Hypothesis<'_>], candidates: &'c [Candidate], given: &[Key]) -> Vec<&'c Candidate> {
-    let alone = |h: &&Hypothesis<'_>| h.effects.len() == 1;
-    let Some(best) = pool.iter().filter(alone).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
-        return Vec::new();
-    };
+    let Some(best) = best_of_size(pool, 1).map(|i| &pool[i]) else { return Vec::new() };
     let heard = |c: &&Candidate| {
         let key = c.key();
         given.contains(&key) || pool.iter().any(|h| h.key() == key && h.log_evidence > best.log_evidence - HOPELESS)
@@ -81,9 +78,7 @@ pub fn outdone_by_a_special_case<'c>(
     pool: &[Hypothesis<'_>],
     candidates: &'c [Candidate],
 ) -> Option<(usize, Vec<&'c Candidate>)> {
-    let best = (0..pool.len())
-        .filter(|&i| pool[i].effects.len() == 1)
-        .max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence))?;
+    let best = best_of_size(pool, 1)?;
     let (special, reached) = (&pool[best].effects[0], pool[best].base.log_likelihood);
     let follows = |c: &Candidate| pool.iter().any(|h| h.key() == c.key() && h.base.log_likelihood >= reached - 1e-3);
     let wider = candidates.iter().filter(|c| {

@@ -51,8 +51,13 @@ pub fn run(shell: &Shell, root: &Path, store: bool) -> anyhow::Result<()> {
 
 /// Whether the processors that Linux lists have what the AVX2 form of the kernels needs.
 fn has_avx2(cpuinfo: &str) -> bool {
+    ["avx2", "fma"].iter().all(|flag| has_flag(cpuinfo, flag))
+}
+
+/// Whether the first processor that Linux lists has a feature.
+pub fn has_flag(cpuinfo: &str, flag: &str) -> bool {
     let flags = cpuinfo.lines().find_map(|l| l.strip_prefix("flags")).unwrap_or("");
-    ["avx2", "fma"].iter().all(|f| flags.split_whitespace().any(|w| w == *f))
+    flags.split_whitespace().any(|w| w == flag)
 }
 
 /// Prints the counts beside the stored ones; the kernels that take more than allowed.

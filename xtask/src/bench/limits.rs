@@ -6,6 +6,7 @@ use anyhow::Context;
 use serde_json::Value;
 use xshell::{Shell, cmd};
 
+use super::guard::has_flag;
 use super::measure::before_all_others;
 
 /// The rates, each with its unit, under the key by which `timed limits` prints them.
@@ -44,8 +45,7 @@ pub fn run(shell: &Shell, root: &Path, rounds: usize) -> anyhow::Result<String> 
 fn processor() -> anyhow::Result<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo")?;
     let field = |key: &str| text.lines().find(|l| l.starts_with(key)).and_then(|l| l.split_once(": ")).map(|(_, v)| v);
-    let flags = field("flags").unwrap_or("");
-    let has = |flag: &str| flags.split_whitespace().any(|f| f == flag);
+    let has = |flag: &str| has_flag(&text, flag);
     let width = if has("avx512f") {
         "AVX-512"
     } else if has("avx2") {

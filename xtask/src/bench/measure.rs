@@ -268,22 +268,23 @@ fn load() -> Option<f64> {
 
 /// What stands before a command that runs before all others on the machine (Linux), as this process and those that it starts do now.
 pub fn before_all_others() -> &'static str {
-    // In `/proc/self/stat`, behind the name, the priority among such processes is the 38th number; 0 for an ordinary one.
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let priority = text.rsplit_once(')').and_then(|(_, rest)| rest.split_whitespace().nth(37));
-    match priority {
-        None | Some("0") => "",
+    // The priority among such processes; 0 for an ordinary one.
+    match own_state(37) {
+        None | Some(0.0) => "",
         Some(_) => "chrt -f 1 ",
     }
 }
 
+/// A number of what Linux tells of this process (`/proc/self/stat`), counted from the state, 0, behind the name, which may hold anything but
+/// ends at the last parenthesis.
+fn own_state(place: usize) -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    text.rsplit_once(')')?.1.split_whitespace().nth(place)?.parse().ok()
+}
+
 /// CPU seconds of the processes that this one started and that have ended (Linux, to 0.01 s).
 fn children_seconds() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // Behind the name, which may hold anything but ends at the last parenthesis, come the state and then numbers.
-    let numbers: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks = |i: usize| numbers.get(i)?.parse::<f64>().ok();
-    Some((ticks(13)? + ticks(14)?) / 100.0)
+    Some((own_state(13)? + own_state(14)?) / 100.0)
 }
 
 /// A Python with the other tools' packages, installed where they are not.

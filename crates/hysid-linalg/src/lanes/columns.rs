@@ -21,30 +21,7 @@ const HELD: usize = 8;
 /// When there are fewer columns than tops.
 pub fn reflect(v0: f64, scale: f64, x: &[f64], tops: &mut [f64], columns: &mut [f64]) {
     let columns = &mut columns[..tops.len() * x.len()];
-    match Machine::detect() {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `detect` returned this form because the processor has these features.
-        Machine::Wide => unsafe { reflect_wide(v0, scale, x, tops, columns) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Machine::Fused => unsafe { reflect_fused(v0, scale, x, tops, columns) },
-        // SAFETY: the plain form needs nothing of the processor.
-        _ => unsafe { reflect_in::<Plain>(v0, scale, x, tops, columns) },
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,fma")]
-fn reflect_wide(v0: f64, scale: f64, x: &[f64], tops: &mut [f64], columns: &mut [f64]) {
-    // SAFETY: this function has the features that the form needs.
-    unsafe { reflect_in::<x86::Wide>(v0, scale, x, tops, columns) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn reflect_fused(v0: f64, scale: f64, x: &[f64], tops: &mut [f64], columns: &mut [f64]) {
-    // SAFETY: this function has the features that the form needs.
-    unsafe { reflect_in::<x86::Fused>(v0, scale, x, tops, columns) }
+    in_form_of!(Machine::detect(), reflect_in(v0: f64, scale: f64, x: &[f64], tops: &mut [f64], columns: &mut [f64]));
 }
 
 /// # Safety
@@ -119,30 +96,7 @@ unsafe fn reflect_some<F: Form, const C: usize>(v0: f64, scale: f64, x: &[f64], 
 /// When there are fewer columns than factors.
 pub fn subtract_multiples(a: &[f64], columns: &[f64], y: &mut [f64]) {
     let columns = &columns[..a.len() * y.len()];
-    match Machine::detect() {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `detect` returned this form because the processor has these features.
-        Machine::Wide => unsafe { subtract_wide(a, columns, y) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Machine::Fused => unsafe { subtract_fused(a, columns, y) },
-        // SAFETY: the plain form needs nothing of the processor.
-        _ => unsafe { subtract_in::<Plain>(a, columns, y) },
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,fma")]
-fn subtract_wide(a: &[f64], columns: &[f64], y: &mut [f64]) {
-    // SAFETY: this function has the features that the form needs.
-    unsafe { subtract_in::<x86::Wide>(a, columns, y) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn subtract_fused(a: &[f64], columns: &[f64], y: &mut [f64]) {
-    // SAFETY: this function has the features that the form needs.
-    unsafe { subtract_in::<x86::Fused>(a, columns, y) }
+    in_form_of!(Machine::detect(), subtract_in(a: &[f64], columns: &[f64], y: &mut [f64]));
 }
 
 /// # Safety

@@ -6,6 +6,34 @@
 //! The same source is compiled for AVX-512, for AVX2 with FMA and for the baseline, and chosen at run time. Results differ
 //! in the last bits between such machines (fused against separate rounding), never between numbers of threads.
 
+/// Runs a kernel in the form for a machine, inside a function that has the processor features which that form needs.
+macro_rules! in_form_of {
+    ($machine:expr, $kernel:ident($($argument:ident: $kind:ty),*)) => {{
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,fma")]
+        fn wide($($argument: $kind),*) {
+            // SAFETY: this function has the features that the form needs.
+            unsafe { $kernel::<x86::Wide>($($argument),*) }
+        }
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2,fma")]
+        fn fused($($argument: $kind),*) {
+            // SAFETY: as above.
+            unsafe { $kernel::<x86::Fused>($($argument),*) }
+        }
+        match $machine {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `detect` returned this form because the processor has these features.
+            Machine::Wide => unsafe { wide($($argument),*) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Machine::Fused => unsafe { fused($($argument),*) },
+            // SAFETY: the plain form needs nothing of the processor.
+            _ => unsafe { $kernel::<Plain>($($argument),*) },
+        }
+    }};
+}
+
 mod columns;
 mod form;
 
@@ -114,31 +142,9 @@ pub struct Step<'a> {
 impl Step<'_> {
     /// Runs the step on the form of the kernel for `machine`.
     pub fn run(self, machine: Machine) {
-        match machine {
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: `detect` returned this form because the processor has these features.
-            Machine::Wide => unsafe { wide(self) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above.
-            Machine::Fused => unsafe { fused(self) },
-            // SAFETY: the plain form needs nothing of the processor.
-            _ => unsafe { step::<Plain>(self) },
-        }
+        let work = self;
+        in_form_of!(machine, step(work: Step<'_>));
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,fma")]
-fn wide(s: Step<'_>) {
-    // SAFETY: this function has the features that the form needs.
-    unsafe { step::<x86::Wide>(s) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn fused(s: Step<'_>) {
-    // SAFETY: this function has the features that the form needs.
-    unsafe { step::<x86::Fused>(s) }
 }
 
 /// Products of a tile with as many samples of a series, whatever their alignment.
@@ -147,20 +153,7 @@ fn fused(s: Step<'_>) {
 /// When `b` has fewer samples than `a`.
 pub fn multiply(a: &[Lane], b: &[f64], out: &mut [Lane], machine: Machine) {
     assert!(b.len() >= a.len() * LANE, "{} samples for {} lanes", b.len(), a.len());
-    match machine {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `detect` returned this form because the processor has these features.
-        Machine::Wide => unsafe { multiply_wide(a, b, out) },
-        // A product is the same in every form.
-        _ => unsafe { multiply_in::<Plain>(a, b, out) },
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,fma")]
-fn multiply_wide(a: &[Lane], b: &[f64], out: &mut [Lane]) {
-    // SAFETY: this function has the features that the form needs.
-    unsafe { multiply_in::<x86::Wide>(a, b, out) }
+    in_form_of!(machine, multiply_in(a: &[Lane], b: &[f64], out: &mut [Lane]));
 }
 
 /// # Safety

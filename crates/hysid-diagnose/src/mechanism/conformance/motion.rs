@@ -2,6 +2,7 @@
 
 use hysid_plant::{Compiled, Direction, Drive, Run, Simulation};
 use hysid_signal::{Channel, Clock, Recording};
+use rand::RngExt;
 
 use super::Breach;
 use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, Stretch, survey};
@@ -31,11 +32,8 @@ pub fn example_recording(simulation: &Simulation, period_s: f64, size: f64) -> O
 
 /// As [`example_recording`], with levels without a pattern that are held for a few samples.
 pub fn jumping_recording(simulation: &Simulation, period_s: f64, size: f64) -> Option<Recording> {
-    let mut state = 0_u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / (1_u64 << 31) as f64
-    };
+    let mut random = crate::random::generator(0, 0);
+    let mut uniform = || random.random::<f64>();
     let mut levels = || {
         let mut series = Vec::with_capacity(SAMPLES);
         while series.len() < SAMPLES {
