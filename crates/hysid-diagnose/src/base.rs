@@ -109,9 +109,10 @@ fn rows(data: &DataSet) -> f64 {
 /// What [`log_likelihood`] would be more with a price of one for each coefficient of the noise model.
 ///
 /// Half of `ln n` is what a coefficient must gain before it is believed. Whoever asks whether something besides noise is there must not
-/// have an effect win by the coefficients that it spares: noise of any colour is likely beforehand.
-pub fn spared(data: &DataSet, noise: &Whitener) -> f64 {
-    noise.coefficients() as f64 * (0.5 * rows(data).ln() - 1.0).max(0.0)
+/// have an effect win by the coefficients that it spares: noise of any colour is likely beforehand. Nor by those that it has besides: what is
+/// more than `none`, the noise of the simulation as it is, has no cheaper price.
+pub fn spared(data: &DataSet, noise: &Whitener, none: &Whitener) -> f64 {
+    noise.coefficients().min(none.coefficients()) as f64 * (0.5 * rows(data).ln() - 1.0).max(0.0)
 }
 
 /// A noise whose innovations are a smaller share of it than this is no noise: something moves the output slowly and smoothly.

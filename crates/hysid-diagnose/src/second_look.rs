@@ -29,7 +29,7 @@ pub const ODDS_AGAINST: f64 = 1000.0;
 pub const ODDS_AGAINST_MORE: f64 = 10.0;
 /// Moments of a recording that are apart for an effect that begins at one of them.
 const MOMENTS: f64 = 25.0;
-/// Log evidence that a set of nothing but drifts must bring besides: noise that rises towards low frequency does what they do,
+/// Log evidence that a set of nothing but drifts and offsets must bring besides: noise that rises towards low frequency does what they do,
 /// process noise on a drive above all.
 pub const SLOW: f64 = 8.0;
 
@@ -68,9 +68,10 @@ impl<'d> Search<'_, 'd> {
         };
         let evidence = |h: &Hypothesis<'_>| {
             let slow = h.effects.iter().all(|e| e.mechanism.family.is_slow_noise());
-            h.log_evidence + spared(self.setting.data, &h.base.whitener) - if slow { SLOW } else { 0.0 }
+            h.log_evidence + spared(self.setting.data, &h.base.whitener, &start.base.whitener)
+                - if slow { SLOW } else { 0.0 }
         };
-        let none = start.log_evidence + spared(self.setting.data, &start.base.whitener);
+        let none = start.log_evidence + spared(self.setting.data, &start.base.whitener, &start.base.whitener);
         let bound = |h: &Hypothesis<'_>| ODDS_AGAINST * sets(h) * (none - evidence(h)).exp();
         let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
         let p = bound(best).min(1.0);

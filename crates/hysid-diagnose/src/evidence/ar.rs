@@ -39,6 +39,17 @@ impl ArModel {
         self.sigma.last().copied().unwrap_or(f64::MIN_POSITIVE)
     }
 
+    /// Natural logarithm of the power at a frequency in cycles a sample, over that of the innovations.
+    pub(super) fn log_power(&self, frequency: f64) -> f64 {
+        let (mut re, mut im) = (1.0, 0.0);
+        for (i, a) in self.coefficients().iter().enumerate() {
+            let (sin, cos) = (std::f64::consts::TAU * frequency * (i + 1) as f64).sin_cos();
+            re -= a * cos;
+            im += a * sin;
+        }
+        -(re * re + im * im).max(f64::MIN_POSITIVE).ln()
+    }
+
     /// Standard deviation of the noise itself (order 0).
     pub fn noise_rms(&self) -> f64 {
         self.sigma.first().copied().unwrap_or(0.0)

@@ -6,9 +6,6 @@
 
 /// Decades below the lowest line over which noise that rises towards low frequency is taken to go on rising.
 const DECADES: f64 = 3.0;
-/// The line from which on it falls, and those down to which that is measured; the steepest counts.
-pub(super) const FIRST: usize = 1;
-pub(super) const LAST: [usize; 2] = [8, 32];
 
 /// How many times the power of the first line the mean of a noise holds.
 #[derive(Debug, Clone, Copy, PartialEq)]

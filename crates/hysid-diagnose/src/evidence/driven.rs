@@ -209,7 +209,9 @@ mod tests {
                 })
                 .sum();
             assert!(portmanteau < 45.3, "{portmanteau}");
-            assert!((norm2(&w) / n - 1.0).abs() < 1e-9);
+            // But for the mean, which counts for less than a line.
+            let mean = w.iter().sum::<f64>() / n;
+            assert!((norm2(&w) / n - 1.0).abs() < 1e-9 + 10.0 * mean * mean, "{} {mean}", norm2(&w) / n);
             m.colour(&mut w);
             assert!(w.iter().zip(&e).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs())));
         }

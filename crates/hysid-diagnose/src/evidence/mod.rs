@@ -10,6 +10,7 @@
 //! Reference: efficient score tests (Neyman C(alpha)); circular-shift surrogates for dependent data.
 
 mod ar;
+mod below;
 mod constancy;
 mod driven;
 mod layout;

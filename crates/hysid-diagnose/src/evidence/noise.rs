@@ -1,5 +1,5 @@
 //! The noise of an output: an autoregression with the shape that the spectrum of its innovations still has on a logarithmic frequency axis, or
-//! an unknown force that passes through the plant.
+//! an unknown force that passes through the plant. Where it rises towards low frequency the mean holds what lies below the lowest line.
 //!
 //! An autoregression of order 16 resolves a sixteenth of the sampling frequency. Noise that rises towards low frequency (1/f, drift of a
 //! sensor) and a slow mismatch in a recording that was sampled a hundred times faster both lie below that. Without the shape such a
@@ -15,15 +15,20 @@ use std::f64::consts::LN_2;
 use hysid_signal::fourier;
 
 use super::ar::{ArModel, fit_ar};
+use super::below::Below;
 use super::driven::Driven;
 use super::projector::norm2;
 use super::response::ForcePath;
-use super::shape::{SpectralShape, corners, even_knots, log_frequency, multiplicity};
+use super::shape::{SpectralShape, corners, even_knots, log_frequency, multiplicity, rise};
 
 /// Orders up to which a short autoregression is tried with a corner, beside the one that BIC chooses without a shape.
 const SHORT_ORDERS: [usize; 2] = [0, 2];
 /// Bins of an octave that lines are gathered in.
 const BINS: f64 = 24.0;
+/// Exponent beyond which a shape rises towards low frequency.
+const RISING: f64 = 0.3;
+/// Exponent beyond which a shape falls towards low frequency as no noise does: what was taken out of a residual leaves such a hole.
+const HOLE: f64 = 0.5;
 /// Fewest samples for a shape or for process noise.
 const SHORTEST: usize = 128;
 
@@ -49,12 +54,13 @@ impl ArModel {
             }
         }
         let lines: Vec<(f64, f64, f64)> = bins.into_values().map(|(x, p, m)| (x / m, p / m, m)).collect();
+        let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
         let price = 0.5 * (total as f64).ln();
         let mut best: (Option<SpectralShape>, f64) = (None, 0.0);
         for knots in shapes {
             let Some((shape, gain)) = SpectralShape::fit(knots.clone(), &lines) else { continue };
             let gain = gain - price * shape.coefficients() as f64;
-            if gain > best.1 {
+            if gain > best.1 && shape.rise(longest) > -HOLE {
                 best = (Some(shape), gain);
             }
         }
@@ -66,6 +72,7 @@ impl ArModel {
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
     kind: Kind,
+    below: Below,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +83,7 @@ enum Kind {
 
 impl NoiseModel {
     fn of(ar: ArModel, shape: Option<SpectralShape>) -> Self {
-        Self { kind: Kind::Shaped(ar, shape) }
+        Self { kind: Kind::Shaped(ar, shape), below: Below::LEVEL }
     }
 
     /// White noise of this standard deviation.
@@ -118,10 +125,20 @@ impl NoiseModel {
             let Some((driven, likelihood)) = Driven::fit(path, stretches, price, most) else { continue };
             let score = likelihood - price * driven.coefficients() as f64;
             if score > most {
-                (best, most) = (Self { kind: Kind::Driven(driven) }, score);
+                (best, most) = (Self { kind: Kind::Driven(driven), below: Below::LEVEL }, score);
             }
         }
+        best.below = Below::rising(best.exponent(longest));
         best
+    }
+
+    /// The exponent by which the power goes on rising below the lowest line of `n` samples.
+    fn exponent(&self, n: usize) -> f64 {
+        // Whatever passes through the plant is known by its way down to the plant's corner, and 1/f noise is easily taken for it.
+        let Kind::Shaped(ar, shape) = &self.kind else { return 1.0 };
+        let rise = rise(|k| ar.log_power(k as f64 / n as f64) + shape.as_ref().map_or(0.0, |s| s.log_power(k, n)));
+        // Where a shape is needed for the lowest lines it is 1/f noise at least, whatever the few lines say of its slope.
+        if shape.is_some() && rise > RISING { rise.max(1.0) } else { rise }
     }
 
     /// Log likelihood of these stretches less half of `ln n` for each coefficient.
@@ -186,10 +203,12 @@ impl NoiseModel {
             }
             Kind::Driven(driven) => driven.whiten(e, out),
         }
+        self.below.whiten(out);
     }
 
     /// Colours unit white noise in place: the inverse of [`NoiseModel::whiten`].
     pub fn colour(&self, w: &mut [f64]) {
+        self.below.colour(w);
         match &self.kind {
             Kind::Shaped(ar, shape) => {
                 if let Some(shape) = shape {
@@ -203,10 +222,11 @@ impl NoiseModel {
 
     /// Logarithm of the determinant of the transformation of `n` samples from white: their share of a log likelihood.
     pub fn log_scale(&self, n: usize) -> f64 {
-        match &self.kind {
+        let lines = match &self.kind {
             Kind::Shaped(ar, shape) => n as f64 * ar.innovation().ln() + shape.as_ref().map_or(0.0, |s| s.log_scale(n)),
             Kind::Driven(driven) => driven.log_scale(n),
-        }
+        };
+        lines + self.below.log_scale()
     }
 }
 

@@ -14,6 +14,15 @@ use nalgebra::{DMatrix, DVector};
 /// must not look like a noise of power zero.
 const PRIOR_SD: f64 = 3.0;
 
+/// Lines up to which the rise towards low frequency is measured, from the first; the steepest counts.
+const LAST: [usize; 2] = [8, 32];
+
+/// The exponent by which a power falls with frequency from the first line on, given its logarithm at each.
+pub(super) fn rise(log_power: impl Fn(usize) -> f64) -> f64 {
+    let slope = |last: usize| (log_power(1) - log_power(last)) / (last as f64).ln();
+    LAST.into_iter().map(slope).fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// Log power against log frequency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectralShape {
@@ -68,7 +77,7 @@ fn between(knots: &[f64], x: f64) -> (usize, f64) {
 
 impl SpectralShape {
     /// Natural logarithm of the power at line `k` of `n` samples.
-    fn log_power(&self, k: usize, n: usize) -> f64 {
+    pub(super) fn log_power(&self, k: usize, n: usize) -> f64 {
         let (i, w) = between(&self.knots, log_frequency(k, n));
         let above = self.heights.get(i + 1).copied().unwrap_or(self.heights[i]);
         (1.0 - w) * self.heights[i] + w * above
@@ -84,6 +93,11 @@ impl SpectralShape {
             line.1 *= factor;
         }
         x.copy_from_slice(&inverse_fourier(&lines, n));
+    }
+
+    /// [`rise`] of the lowest lines of `n` samples.
+    pub(super) fn rise(&self, n: usize) -> f64 {
+        rise(|k| self.log_power(k, n))
     }
 
     /// Number of coefficients: heights, and the place of a single corner.

@@ -102,16 +102,47 @@ fn surrogate(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> V
     out
 }
 
-/// The level of each line of a series' spectrum: the median of its neighbours, as wide as a third of the frequency, at least nine lines.
+/// Lines on which the rise towards low frequency is measured.
+const LOW: usize = 32;
+
+/// How steeply the power of the lowest lines falls with frequency: the exponent of a power law through the medians of octaves, at least 0.
+///
+/// The lowest octaves, which a slow effect lives in, count for as little as they have lines.
+fn slope(power: &[f64]) -> f64 {
+    let mut points: Vec<(f64, f64, f64)> = Vec::new();
+    let mut first = 1;
+    while 2 * first <= LOW.min(power.len()) {
+        let mut octave = power[first..2 * first].to_vec();
+        octave.sort_by(f64::total_cmp);
+        let median = octave[octave.len() / 2].max(f64::MIN_POSITIVE);
+        points.push(((1.5 * first as f64).ln(), median.ln(), first as f64));
+        first *= 2;
+    }
+    let weight: f64 = points.iter().map(|p| p.2).sum();
+    let mean = |of: fn(&(f64, f64, f64)) -> f64| points.iter().map(|p| p.2 * of(p)).sum::<f64>() / weight;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let (mut xx, mut xy) = (0.0, 0.0);
+    for p in &points {
+        xx += p.2 * (p.0 - x).powi(2);
+        xy += p.2 * (p.0 - x) * (p.1 - y);
+    }
+    if xx > 0.0 { (-xy / xx).clamp(0.0, 2.0) } else { 0.0 }
+}
+
+/// The level of each line of a series' spectrum: the median of its neighbours, as wide as a third of the frequency, at least nine lines, which
+/// are set off against each other by the rise towards low frequency: the neighbours of the lowest lines all lie on one side.
 fn levels(x: &[f64]) -> Vec<f64> {
     let power: Vec<f64> = fourier(x).iter().map(|(re, im)| re * re + im * im).collect();
     let last = power.len().saturating_sub(1);
+    let slope = slope(&power);
+    // The mean stands where the first half of the first line does.
+    let place = |k: usize| (k as f64).max(0.5);
     (0..power.len())
         .map(|k| {
             let half = (k / 3).max(4);
+            let moved = |j: usize| if k < LOW { power[j] * (place(j) / place(k)).powf(slope) } else { power[j] };
             // The mean is a line of its own kind.
-            let window = k.saturating_sub(half).max(1)..=(k + half).min(last);
-            let mut near: Vec<f64> = power.get(window).unwrap_or_default().to_vec();
+            let mut near: Vec<f64> = (k.saturating_sub(half).max(1)..=(k + half).min(last)).map(moved).collect();
             near.sort_by(f64::total_cmp);
             // The median of an exponential law is ln 2 of its mean.
             near.get(near.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
@@ -119,18 +150,32 @@ fn levels(x: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// Lines to a group whose level is drawn together, from the first line of the group: those that one median is taken over.
+fn group(first: usize) -> usize {
+    (2 * first / 3).max(9)
+}
+
 /// Gaussian noise with these levels, for each series of the layout.
+///
+/// A level is known as well as the median of a few lines knows it. It is drawn too, as that of a normal law with half as many degrees of freedom
+/// as the lines of its median have, which is what a median is worth: a line that is compared with nine others exceeds them more often than one
+/// whose level is known.
 fn drawn(layout: &Layout, levels: &[Vec<f64>], rows: usize, seed: u64, index: u64) -> Vec<f64> {
     let mut rng = generator(seed, 0x6u64 << 56 | index);
+    let normal = |rng: &mut _| Distribution::<f64>::sample(&StandardNormal, rng);
     let mut out = vec![0.0; rows];
     for (s, levels) in layout.series.iter().zip(levels) {
-        let lines: Vec<(f64, f64)> = levels
-            .iter()
-            .map(|l| {
-                let mut part = || (0.5 * l).sqrt() * Distribution::<f64>::sample(&StandardNormal, &mut rng);
-                (part(), part())
-            })
-            .collect();
+        let mut lines: Vec<(f64, f64)> = Vec::with_capacity(levels.len());
+        let (mut end, mut doubt) = (0, 1.0);
+        for (k, l) in levels.iter().enumerate() {
+            if k == end {
+                end += group(k);
+                let squares: f64 = (k..end).map(|_| normal(&mut rng).powi(2)).sum();
+                doubt = (end - k) as f64 / squares;
+            }
+            let size = (0.5 * l * doubt).sqrt();
+            lines.push((size * normal(&mut rng), size * normal(&mut rng)));
+        }
         out[s.rows.clone()].copy_from_slice(&inverse_fourier(&lines, s.rows.len()));
     }
     out

@@ -117,7 +117,7 @@ impl Family {
     /// element and a spectrum of relaxation times are a single relaxation within the band that was excited, and a zero that moves is what
     /// noise does that rises towards low frequencies.
     pub fn stands_for_others(self) -> bool {
-        self == Self::LinearMemory || self.is_slow_noise()
+        matches!(self, Self::LinearMemory | Self::SensorDrift)
     }
 
     /// The family one of whose members becomes one of this family's by a single parameter: Dahl's law is Bouc and Wen's with `gamma = 0`, a
@@ -137,8 +137,8 @@ impl Family {
         matches!(self, Self::DryFriction | Self::Presliding | Self::HystereticSpring)
     }
 
-    /// Whether its members are what noise of low frequency does: no noise model of a recording's own length can tell.
+    /// Whether its members are what noise of low frequency does, a zero that moves or stands elsewhere: no noise model of a recording's own length can tell.
     pub fn is_slow_noise(self) -> bool {
-        self == Self::SensorDrift
+        matches!(self, Self::SensorDrift | Self::Bias)
     }
 }

@@ -176,8 +176,9 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
         (coefficients, after) = regress(base, &picked, &left, None, 0.0);
     }
     let data = base.model.data();
-    let likelihood =
-        kind.share() * (log_likelihood(data, &left, &after) + spared(data, &left) - spared(data, &base.whitener));
+    let likelihood = kind.share()
+        * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)
+            - spared(data, &base.whitener, &base.whitener));
     let price: f64 = (0..chosen.len())
         .map(|k| {
             0.5 * (kind.share() * after.len() as f64).max(2.0).ln() + ((usable.len() - k) as f64 / (k + 1) as f64).ln()

@@ -118,7 +118,7 @@ impl<'a> View<'a> {
         let data = base.model.data();
         let plain = self.noise.apply(self.layout, &base.fit.residual);
         let fitted = 0.5 * (norm2(&plain) - norm2(&self.r));
-        log_likelihood(data, self.noise, &base.fit.residual) + fitted + spared(data, self.noise)
+        log_likelihood(data, self.noise, &base.fit.residual) + fitted + spared(data, self.noise, &base.whitener)
     }
 }
 
@@ -244,7 +244,10 @@ fn judged(
         Course::Line(_) => {
             let each = 0.5 * (share * data.rows() as f64).max(2.0).ln();
             let lines = time.samples().max(2) as f64;
-            (share * (log_likelihood(data, &left, &after) + spared(data, &left)), 2.0 * each + lines.ln() + among)
+            (
+                share * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)),
+                2.0 * each + lines.ln() + among,
+            )
         }
     };
     let total = norm2(&view.r).max(f64::MIN_POSITIVE);
