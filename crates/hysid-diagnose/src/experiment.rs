@@ -7,7 +7,7 @@
 //!
 //! Reference: W. G. Hunter and A. M. Reiner, Designs for discriminating between two rival models, Technometrics 7 (1965) 307-323.
 
-use hysid_plant::{Drive, Initial, Simulation};
+use hysid_plant::{Drive, Simulation};
 use hysid_signal::Excitation;
 use rayon::prelude::*;
 
@@ -16,6 +16,7 @@ use crate::budget::Step;
 use crate::data::DataSet;
 use crate::evidence::{Whitener, norm2};
 use crate::file::{AlternativeRecord, ExperimentRecord, finite};
+use crate::fresh::{answered, started};
 use crate::hypothesis::{Hypothesis, Setting};
 use crate::mechanism::excited_band;
 use crate::model::{Model, Values};
@@ -162,24 +163,11 @@ fn library(setting: &Setting<'_>, seed: u64, row: usize) -> Vec<Trial> {
 
 /// The separation of two explanations on one input: the smaller of both directions.
 fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) -> Option<f64> {
-    let n = trial.drive.len();
-    let outputs = setting.original.outputs.len();
-    let started = |base: &Base<'_>| {
-        // A fresh experiment starts where the document says; free states start at zero.
-        let mut d = base.document();
-        d.states.iter_mut().filter(|s| s.initial == Initial::Free).for_each(|s| s.initial = Initial::Number(0.0));
-        d
-    };
     let (da, db) = (started(a), started(b));
     // Louder means faster, and a law that slides within a sample needs shorter steps for it.
     let substeps = if trial.level > 1.0 { 2 * setting.substeps } else { setting.substeps };
     let one = |truth: &Simulation, noise: &Whitener, rival: &Simulation, rival_values: &Values| -> Option<f64> {
-        let empty = DataSet::of_drive(trial.drive.clone(), vec![vec![0.0; n]; outputs], setting.data.period_s);
-        let mut fixed = truth.clone();
-        fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
-        let model = Model::new(&fixed, &empty, &[], substeps).ok()?;
-        let y = model.predict(&model.theta(&Values::default()))?;
-        let data = empty.with_outputs(y);
+        let data = answered(setting, truth, &trial.drive, substeps)?;
         distance(rival, rival_values, &data, &[], substeps, noise)
     };
     let forth = one(&da, &a.whitener, &db, &b.values())?;

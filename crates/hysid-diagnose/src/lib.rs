@@ -26,6 +26,7 @@ mod finer;
 mod firmness;
 mod fitting;
 mod force;
+mod fresh;
 mod hold;
 mod hypothesis;
 mod intake;

@@ -13,6 +13,7 @@ use crate::experiment::separating;
 use crate::file::*;
 use crate::firmness::{firmness, likelihoods};
 use crate::force::pushed;
+use crate::fresh::gamble;
 use crate::hold::free_run;
 use crate::hypothesis::Setting;
 use crate::intake::{Intake, intake};
@@ -23,6 +24,7 @@ use crate::reliability::recalibrate;
 use crate::screen::screen;
 use crate::search::{Search, calibrate, words};
 use crate::second_look::{ODDS_AGAINST, unlikely};
+use crate::text::number;
 use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, verdict};
 use crate::weigh::*;
 
@@ -263,7 +265,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if significant && file.verdict == VerdictKind::NoSignificantMismatch {
         file.notes.push("simulation and recording differ by more than the surrogates do, but no effect and no generic term explains it: nothing is claimed".into());
     }
-    let named = if winner > 0 && !vetoed && !left.foreign { winner } else { 0 };
+    let gamble = if winner > 0 && !vetoed { gamble(setting, &pool[0].base, &best.base, &support) } else { None };
+    if let Some(reach) = gamble {
+        file.notes.push(format!("on the recorded inputs mirrored, the set of effects would carry the simulation {} times as far as on the inputs as they were recorded, and it is not sure: no augmented simulation is written, since it may be worse than nothing there", number(reach)));
+    }
+    let named = if winner > 0 && !vetoed && gamble.is_none() && !left.foreign { winner } else { 0 };
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {
         (hooks.progress)("writing the correction into the simulation");
         left.modelled(search, &pool, winner, named)
