@@ -167,7 +167,7 @@ fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) 
     // Louder means faster, and a law that slides within a sample needs shorter steps for it.
     let substeps = if trial.level > 1.0 { 2 * setting.substeps } else { setting.substeps };
     let one = |truth: &Simulation, noise: &Whitener, rival: &Simulation, rival_values: &Values| -> Option<f64> {
-        let data = answered(setting, truth, &trial.drive, substeps)?;
+        let data = answered(truth, &trial.drive, substeps)?;
         distance(rival, rival_values, &data, &[], substeps, noise)
     };
     let forth = one(&da, &a.whitener, &db, &b.values())?;
