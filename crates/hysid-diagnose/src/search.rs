@@ -9,7 +9,7 @@ use crate::base::Base;
 use crate::budget::Step;
 use crate::compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short_list, unheard};
 use crate::error::DiagnoseError;
-use crate::evidence::{FeatureGroup, Projector, SurrogateTest, TestOptions, surrogate_test};
+use crate::evidence::{Contender, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all, refit_wider};
 use crate::hypothesis::{Hypothesis, Key, Setting};
 use crate::mechanism::Mechanism;
@@ -17,7 +17,7 @@ use crate::model::{Model, Values};
 use crate::openset::{OpenSet, correction};
 use crate::pipeline::{Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
-use crate::second_look::{ODDS_AGAINST_MORE, unlikely};
+use crate::second_look::{ODDS_AGAINST_MORE, SLOW, unlikely};
 use crate::slot::Slot;
 
 /// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
@@ -241,10 +241,16 @@ impl<'a, 'd> Search<'a, 'd> {
         }
     }
 
-    /// The mismatch test over all candidates' kept columns.
+    /// The mismatch test over all candidates' kept columns. Where the noise has a colour, what slow noise does has a handicap.
     pub fn test(&self, candidates: &[Candidate], base: &Base<'_>, evidence: &(Projector, Vec<f64>)) -> SurrogateTest {
-        let groups: Vec<&FeatureGroup> =
-            candidates.iter().flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref())).collect();
+        let coloured = base.whitener.coefficients() > 0;
+        // A score is twice a gain in log likelihood.
+        let handicap = |c: &Candidate| if coloured && c.mechanism.family.is_slow_noise() { 2.0 * SLOW } else { 0.0 };
+        let groups: Vec<Contender<'_>> = candidates
+            .iter()
+            .flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref()).map(move |group| (c, group)))
+            .map(|(c, group)| Contender { group, handicap: handicap(c) })
+            .collect();
         let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed };
         surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, options)
     }

@@ -28,4 +28,4 @@ pub use noise::NoiseModel;
 pub use projector::{Projector, dot, norm2};
 pub use response::ForcePath;
 pub use score::{FeatureGroup, detectable_amplitude, score};
-pub use surrogate::{SurrogateTest, TestOptions, correlation_time, surrogate_test};
+pub use surrogate::{Contender, SurrogateTest, TestOptions, correlation_time, surrogate_test};

@@ -45,6 +45,16 @@ pub struct SurrogateTest {
     pub surrogates: Vec<f64>,
 }
 
+/// A group that is tested.
+#[derive(Debug, Clone, Copy)]
+pub struct Contender<'a> {
+    /// The responses.
+    pub group: &'a FeatureGroup,
+    /// What its score on the residual must bring beyond that of others, since the noise itself does what it does. Its scores on surrogates
+    /// count in full.
+    pub handicap: f64,
+}
+
 /// Samples until the autocorrelation of the series stays below 0.1, at least 1, over the longest series of the stack.
 pub fn correlation_time(layout: &Layout, r: &[f64]) -> usize {
     let Some(s) = layout.series.iter().max_by_key(|s| s.rows.len()) else { return 1 };
@@ -60,13 +70,13 @@ pub fn correlation_time(layout: &Layout, r: &[f64]) -> usize {
 /// Surrogates that are scored together: the groups' columns are far more than a cache holds, and each is read once for all of them.
 const TOGETHER: usize = 8;
 
-/// The largest score over the groups, with the group, of each of these residuals.
-fn largest(groups: &[&FeatureGroup], residuals: &[Vec<f64>], own: &Projector) -> Vec<(f64, Option<usize>)> {
+/// The largest score over the groups less their handicaps, with the group, of each of these residuals.
+fn largest(groups: &[Contender<'_>], residuals: &[Vec<f64>], own: &Projector) -> Vec<(f64, Option<usize>)> {
     let mut best: Vec<(f64, Option<usize>)> = vec![(f64::NEG_INFINITY, None); residuals.len()];
     let totals: Vec<f64> = residuals.iter().map(|r| norm2(r) - own.inside(r)).collect();
     for (i, g) in groups.iter().enumerate() {
         for ((r, total), best) in residuals.iter().zip(&totals).zip(&mut best) {
-            let s = score(*total, g.explained(r), r.len(), g.columns.len());
+            let s = score(*total, g.group.explained(r), r.len(), g.group.columns.len()) - g.handicap;
             if s > best.0 {
                 *best = (s, Some(i));
             }
@@ -102,47 +112,16 @@ fn surrogate(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> V
     out
 }
 
-/// Lines on which the rise towards low frequency is measured.
-const LOW: usize = 32;
-
-/// How steeply the power of the lowest lines falls with frequency: the exponent of a power law through the medians of octaves, at least 0.
-///
-/// The lowest octaves, which a slow effect lives in, count for as little as they have lines.
-fn slope(power: &[f64]) -> f64 {
-    let mut points: Vec<(f64, f64, f64)> = Vec::new();
-    let mut first = 1;
-    while 2 * first <= LOW.min(power.len()) {
-        let mut octave = power[first..2 * first].to_vec();
-        octave.sort_by(f64::total_cmp);
-        let median = octave[octave.len() / 2].max(f64::MIN_POSITIVE);
-        points.push(((1.5 * first as f64).ln(), median.ln(), first as f64));
-        first *= 2;
-    }
-    let weight: f64 = points.iter().map(|p| p.2).sum();
-    let mean = |of: fn(&(f64, f64, f64)) -> f64| points.iter().map(|p| p.2 * of(p)).sum::<f64>() / weight;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let (mut xx, mut xy) = (0.0, 0.0);
-    for p in &points {
-        xx += p.2 * (p.0 - x).powi(2);
-        xy += p.2 * (p.0 - x) * (p.1 - y);
-    }
-    if xx > 0.0 { (-xy / xx).clamp(0.0, 2.0) } else { 0.0 }
-}
-
-/// The level of each line of a series' spectrum: the median of its neighbours, as wide as a third of the frequency, at least nine lines, which
-/// are set off against each other by the rise towards low frequency: the neighbours of the lowest lines all lie on one side.
+/// The level of each line of a series' spectrum: the median of its neighbours, as wide as a third of the frequency, at least nine lines.
 fn levels(x: &[f64]) -> Vec<f64> {
     let power: Vec<f64> = fourier(x).iter().map(|(re, im)| re * re + im * im).collect();
     let last = power.len().saturating_sub(1);
-    let slope = slope(&power);
-    // The mean stands where the first half of the first line does.
-    let place = |k: usize| (k as f64).max(0.5);
     (0..power.len())
         .map(|k| {
             let half = (k / 3).max(4);
-            let moved = |j: usize| if k < LOW { power[j] * (place(j) / place(k)).powf(slope) } else { power[j] };
             // The mean is a line of its own kind.
-            let mut near: Vec<f64> = (k.saturating_sub(half).max(1)..=(k + half).min(last)).map(moved).collect();
+            let window = k.saturating_sub(half).max(1)..=(k + half).min(last);
+            let mut near: Vec<f64> = power.get(window).unwrap_or_default().to_vec();
             near.sort_by(f64::total_cmp);
             // The median of an exponential law is ln 2 of its mean.
             near.get(near.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
@@ -150,32 +129,18 @@ fn levels(x: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Lines to a group whose level is drawn together, from the first line of the group: those that one median is taken over.
-fn group(first: usize) -> usize {
-    (2 * first / 3).max(9)
-}
-
 /// Gaussian noise with these levels, for each series of the layout.
-///
-/// A level is known as well as the median of a few lines knows it. It is drawn too, as that of a normal law with half as many degrees of freedom
-/// as the lines of its median have, which is what a median is worth: a line that is compared with nine others exceeds them more often than one
-/// whose level is known.
 fn drawn(layout: &Layout, levels: &[Vec<f64>], rows: usize, seed: u64, index: u64) -> Vec<f64> {
     let mut rng = generator(seed, 0x6u64 << 56 | index);
-    let normal = |rng: &mut _| Distribution::<f64>::sample(&StandardNormal, rng);
     let mut out = vec![0.0; rows];
     for (s, levels) in layout.series.iter().zip(levels) {
-        let mut lines: Vec<(f64, f64)> = Vec::with_capacity(levels.len());
-        let (mut end, mut doubt) = (0, 1.0);
-        for (k, l) in levels.iter().enumerate() {
-            if k == end {
-                end += group(k);
-                let squares: f64 = (k..end).map(|_| normal(&mut rng).powi(2)).sum();
-                doubt = (end - k) as f64 / squares;
-            }
-            let size = (0.5 * l * doubt).sqrt();
-            lines.push((size * normal(&mut rng), size * normal(&mut rng)));
-        }
+        let lines: Vec<(f64, f64)> = levels
+            .iter()
+            .map(|l| {
+                let mut part = || (0.5 * l).sqrt() * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+                (part(), part())
+            })
+            .collect();
         out[s.rows.clone()].copy_from_slice(&inverse_fourier(&lines, s.rows.len()));
     }
     out
@@ -186,7 +151,7 @@ fn drawn(layout: &Layout, levels: &[Vec<f64>], rows: usize, seed: u64, index: u6
 /// Surrogates are drawn in batches: a clear answer ends after 199, a close one goes on to `4/alpha` (at least 999). The p-value is the
 /// larger one of the two kinds of surrogate; the second kind is drawn only where the first is exceeded.
 pub fn surrogate_test(
-    groups: &[&FeatureGroup],
+    groups: &[Contender<'_>],
     layout: &Layout,
     own: &Projector,
     r: &[f64],
@@ -197,7 +162,8 @@ pub fn surrogate_test(
         return SurrogateTest { p_value: 1.0, statistic: 0.0, best: None, surrogates: Vec::new() };
     }
     let tau = correlation_time(layout, r);
-    let scores_of = |some: &[Vec<f64>]| largest(groups, some, own).into_iter().map(|l| l.0).collect();
+    let fairly: Vec<Contender<'_>> = groups.iter().map(|g| Contender { handicap: 0.0, ..*g }).collect();
+    let scores_of = |some: &[Vec<f64>]| largest(&fairly, some, own).into_iter().map(|l| l.0).collect();
     let rolled = |some: Range<u64>| -> Vec<f64> {
         scores_of(&some.map(|b| surrogate(layout, r, tau, options.seed, b)).collect::<Vec<_>>())
     };
@@ -329,7 +295,7 @@ mod tests {
             .iter()
             .filter_map(|f| FeatureGroup::new(std::slice::from_ref(f), &layout, &whitener, &own))
             .collect();
-        let refs: Vec<&FeatureGroup> = groups.iter().collect();
+        let refs: Vec<Contender<'_>> = groups.iter().map(|group| Contender { group, handicap: 0.0 }).collect();
         surrogate_test(&refs, &layout, &own, &r, TestOptions { alpha: 0.05, seed }).p_value
     }
 
