@@ -27,8 +27,8 @@ pub struct Map {
 pub const MECHANISM: Map = Map { constant: 0.40, slope: 0.52, several: -0.74 };
 /// For families.
 pub const FAMILY: Map = Map { constant: -0.05, slope: 0.89, several: -0.85 };
-/// Probability of a member of a set that is called an imitation: none of 22 was right, one of them in family, and half a case of each is granted.
-pub const IMITATION: f64 = 0.04;
+/// Probability of a member of a set that is called an imitation: none of 22 was right, and half a case is granted.
+pub const IMITATION: f64 = 0.02;
 /// Supports beyond these count as these.
 const ENDS: (f64, f64) = (0.02, 0.98);
 
