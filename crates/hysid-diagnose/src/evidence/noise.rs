@@ -281,6 +281,18 @@ mod tests {
     }
 
     #[test]
+    fn a_hole_at_the_lowest_lines_is_no_noise() {
+        // What the courses of a walk take out of a residual.
+        let mut lines = fourier(&white(3000, 6));
+        for (k, line) in lines.iter_mut().enumerate().take(20) {
+            let left = k as f64 / 20.0;
+            *line = (line.0 * left, line.1 * left);
+        }
+        let m = NoiseModel::fit(&[&inverse_fourier(&lines, 3000)], 16, &[]);
+        assert!(matches!(m.kind, Kind::Shaped(_, None)), "{m:?}");
+    }
+
+    #[test]
     fn whitening_and_colouring_are_inverse_and_the_determinant_is_that_of_the_map() {
         let m = NoiseModel::fit(&[&pink(4000, 1)], 2, &[]);
         let Kind::Shaped(_, Some(shape)) = &m.kind else { panic!("a shape") };
