@@ -29,6 +29,29 @@ impl NoiseKind {
             Self::White(share) => share,
         }
     }
+
+    /// What `further` unknowns cost in log evidence beside `own` ones in a recording of so many rows: half of `ln n` each.
+    ///
+    /// Where rows are no independent witnesses, few are left, and half of `ln n` for each unknown is too little: the more unknowns there are
+    /// beside few witnesses, the more each explains by chance. The price is then that of the Bayes criterion corrected for small samples
+    /// (A. D. R. McQuarrie, C.-L. Tsai, Regression and Time Series Model Selection, World Scientific (1998), BICc).
+    pub fn price(self, own: usize, further: usize, rows: usize) -> f64 {
+        let rows = (self.share() * rows as f64).max(2.0);
+        let all = |unknowns: usize| match self {
+            Self::Coloured => 0.5 * unknowns as f64 * rows.ln(),
+            Self::White(_) => corrected_price(unknowns as f64, rows),
+        };
+        all(own + further) - all(own)
+    }
+}
+
+/// Least share of the rows that the correction for small samples leaves: beyond it the criterion is no approximation of anything.
+const LEAST_LEFT: f64 = 0.25;
+
+/// What the corrected Bayes criterion takes for these unknowns beside so many independent rows.
+fn corrected_price(unknowns: f64, rows: f64) -> f64 {
+    let left = ((rows - unknowns - 2.0) / rows).max(LEAST_LEFT);
+    0.5 * unknowns * rows.ln() / left
 }
 
 /// A simulation fitted to a data set under a noise model of its own.
@@ -186,5 +209,27 @@ impl Base<'_> {
         let white = self.whitener.apply(&data.layout, &self.fit.residual);
         let variance = norm2(&white) / (data.rows().saturating_sub(self.fit.theta.len())).max(1) as f64;
         self.fit.covariance(&data.layout, &self.whitener, None, variance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beside_few_witnesses_each_further_unknown_costs_more() {
+        let step = |unknowns: f64, rows: f64| corrected_price(unknowns + 1.0, rows) - corrected_price(unknowns, rows);
+        assert!((step(5.0, 1e6) - 0.5 * 1e6_f64.ln()).abs() < 1e-3);
+        let many = 0.5 * 20.0_f64.ln();
+        assert!(step(4.0, 20.0) > 1.5 * many && step(6.0, 20.0) > step(5.0, 20.0));
+        // Where nothing is left it grows no more.
+        assert!((step(30.0, 20.0) - many / LEAST_LEFT).abs() < 1e-9);
+    }
+
+    #[test]
+    fn rows_count_for_their_share_of_a_witness() {
+        let (rows, few) = (NoiseKind::White(1.0).price(4, 3, 25), NoiseKind::White(0.01).price(4, 3, 2500));
+        assert!((rows - few).abs() < 1e-9 && rows > NoiseKind::Coloured.price(4, 3, 25));
+        assert!((NoiseKind::Coloured.price(4, 3, 25) - 1.5 * 25_f64.ln()).abs() < 1e-12);
     }
 }

@@ -143,41 +143,8 @@ impl<'d> Setting<'d> {
     }
 
     /// The evidence of a fitted document.
-    ///
-    /// Where rows are no independent witnesses, few are left, and half of `ln n` for each unknown is too little: the more unknowns there are
-    /// beside few witnesses, the more each explains by chance. The price is then that of the Bayes criterion corrected for small samples
-    /// (A. D. R. McQuarrie, C.-L. Tsai, Regression and Time Series Model Selection, World Scientific (1998), BICc).
     pub fn evidence(&self, base: &Base<'_>) -> f64 {
-        let rows = (self.noise.share() * self.data.rows() as f64).max(2.0);
-        let all = base.model.unknowns().len().max(self.own_unknowns);
-        let price = |unknowns: usize| match self.noise {
-            NoiseKind::Coloured => 0.5 * unknowns as f64 * rows.ln(),
-            NoiseKind::White(_) => corrected_price(unknowns as f64, rows),
-        };
-        base.log_likelihood - (price(all) - price(self.own_unknowns))
-    }
-}
-
-/// Least share of the rows that the correction for small samples leaves: beyond it the criterion is no approximation of anything.
-const LEAST_LEFT: f64 = 0.25;
-
-/// What the corrected Bayes criterion takes for these unknowns beside so many independent rows.
-fn corrected_price(unknowns: f64, rows: f64) -> f64 {
-    let left = ((rows - unknowns - 2.0) / rows).max(LEAST_LEFT);
-    0.5 * unknowns * rows.ln() / left
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn beside_few_witnesses_each_further_unknown_costs_more() {
-        let step = |unknowns: f64, rows: f64| corrected_price(unknowns + 1.0, rows) - corrected_price(unknowns, rows);
-        assert!((step(5.0, 1e6) - 0.5 * 1e6_f64.ln()).abs() < 1e-3);
-        let many = 0.5 * 20.0_f64.ln();
-        assert!(step(4.0, 20.0) > 1.5 * many && step(6.0, 20.0) > step(5.0, 20.0));
-        // Where nothing is left it grows no more.
-        assert!((step(30.0, 20.0) - many / LEAST_LEFT).abs() < 1e-9);
+        let further = base.model.unknowns().len().saturating_sub(self.own_unknowns);
+        base.log_likelihood - self.noise.price(self.own_unknowns, further, self.data.rows())
     }
 }

@@ -179,11 +179,9 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
     let likelihood = kind.share()
         * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)
             - spared(data, &base.whitener, &base.whitener));
-    let price: f64 = (0..chosen.len())
-        .map(|k| {
-            0.5 * (kind.share() * after.len() as f64).max(2.0).ln() + ((usable.len() - k) as f64 / (k + 1) as f64).ln()
-        })
-        .sum();
+    // Generic terms pay for their coefficients what an effect pays for its parameters, and for having been chosen out of many.
+    let among: f64 = (0..chosen.len()).map(|k| ((usable.len() - k) as f64 / (k + 1) as f64).ln()).sum();
+    let price = kind.price(base.model.unknowns().len(), chosen.len(), after.len()) + among;
     let err = selection.steps.iter().map(|s| s.err).collect();
     Some(Chosen { terms: chosen, err, coefficients, left, gain: likelihood - base.log_likelihood - price })
 }

@@ -242,11 +242,11 @@ fn judged(
             (share * view.log_likelihood(base) + Wander::new(&white, &view.r, share).mean_gain().0, among + SLOW)
         }
         Course::Line(_) => {
-            let each = 0.5 * (share * data.rows() as f64).max(2.0).ln();
+            let both = kind.price(base.model.unknowns().len(), 2, data.rows());
             let lines = time.samples().max(2) as f64;
             (
                 share * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)),
-                2.0 * each + lines.ln() + among,
+                both + lines.ln() + among,
             )
         }
     };
