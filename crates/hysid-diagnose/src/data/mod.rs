@@ -171,9 +171,7 @@ impl DataSet {
             return self.clone();
         }
         let mut notes = self.notes.clone();
-        notes.push(format!(
-            "the outputs were filtered and every {step}-th sample of them is compared: nothing in them moves faster"
-        ));
+        notes.push(format!("means of the outputs over {step} samples are compared: nothing in them moves faster"));
         let stretches = self.stretches.clone();
         Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, notes, step)
     }

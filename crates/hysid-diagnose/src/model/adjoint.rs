@@ -5,7 +5,7 @@
 //! and its periodogram are the scores of every modulation there is.
 //!
 //! The equations are linearised at each sample and stepped by the (2,2) Pade approximant of their exponential, which is stable however stiff
-//! they are and exact to the fourth order. Signals count as held from sample to sample, filters of thinned outputs as a single tap: the result serves
+//! they are and exact to the fourth order. Signals count as held from sample to sample, means of thinned outputs as a single sample: the result serves
 //! to find modulations, whose exact responses are then taken forwards.
 
 use nalgebra::DMatrix;
