@@ -26,6 +26,8 @@ pub enum Step {
     Composition,
     /// Sets fitted under another noise model.
     OtherNoise,
+    /// The second look on simulated recordings.
+    Rehearsal,
     /// Scores of rivals on held-out blocks.
     Blocks,
     /// The test of what remains.
@@ -42,6 +44,7 @@ impl Step {
             Self::Numerics => "the simulation's own numerics",
             Self::Composition => "further effects",
             Self::OtherNoise => "fits under another noise model",
+            Self::Rehearsal => "the second look on simulated recordings",
             Self::Blocks => "rivals on held-out blocks",
             Self::Remains => "the test of what remains",
             Self::Experiment => "an experiment",

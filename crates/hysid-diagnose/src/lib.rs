@@ -39,6 +39,7 @@ mod pipeline;
 mod random;
 mod records;
 mod region;
+mod rehearsal;
 mod report_values;
 mod screen;
 mod search;

@@ -148,23 +148,26 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(&plain, options, hooks);
     let murky = none.base.gross() || none.base.far();
-    let heard = murky || (none.base.coloured() && !budget.omits(Step::OtherNoise));
+    let heard = murky || ((none.base.coloured() || none.base.driven()) && !budget.omits(Step::OtherNoise));
     let plain_start = if heard { plainly.start(&none) } else { None };
+    let (mut gross, under_white) = if murky { (plain_start, None) } else { (None, plain_start) };
     let mut significant = test.p_value < options.alpha;
     let mut pool = Vec::new();
     // A coloured noise model takes part of a mismatch for noise: what plain squares would find is heard too.
-    if !murky && let Some((start, found)) = &plain_start {
+    if let Some((start, found)) = &under_white {
         (hooks.progress)("refitting the likeliest effects without a noise model");
         pool = search.under_noise(&none, &plainly.glance(start, found));
     }
-    let mut gross = plain_start.filter(|_| murky);
     if !significant {
         (hooks.progress)("taking a second look");
         let seen = match &gross {
             Some((start, found)) => plainly.on_blocks(start, &plainly.glance(start, found)),
             None => {
                 search.glance(&none, &candidates).into_iter().for_each(|h| add(&mut pool, h));
-                search.by_chance(&none, &pool, candidates.len())
+                search.by_chance(&none, &pool, candidates.len()).or_else(|| {
+                    (hooks.progress)("rehearsing on simulated recordings in which nothing is missing");
+                    search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref())
+                })
             }
         };
         let seen =
@@ -262,8 +265,13 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     if left.is_outside(&support, file.remaining.as_ref()) && !budget.unfinished() {
         file.verdict = VerdictKind::NotInCatalogue;
     }
+    // What is significant stays so, though no set outweighs its price: the likeliest is told, neither believed nor written.
     if significant && file.verdict == VerdictKind::NoSignificantMismatch {
-        file.notes.push("simulation and recording differ by more than the surrogates do, but no effect and no generic term explains it: nothing is claimed".into());
+        file.verdict = VerdictKind::Ambiguous;
+        if let Some(likeliest) = likeliest(&weighed) {
+            file.effects = effects(&pool[likeliest], &firmness(&pool, &weighed, &probability, likeliest, true));
+        }
+        file.notes.push("simulation and recording differ by more than noise does, but no effect and no generic term outweighs what its parameters cost: what is told is the likeliest, and no augmented simulation is written".into());
     }
     let gamble = if winner > 0 && !vetoed { gamble(setting, &pool[0].base, &best.base, &support) } else { None };
     if let Some(reach) = gamble {

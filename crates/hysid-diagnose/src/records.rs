@@ -270,6 +270,9 @@ pub fn summary(file: &DiagnosisFile, varying: Option<&str>) -> String {
             let families: Vec<&str> = file.effects.iter().map(|e| e.family.as_str()).collect();
             format!("The family is firm ({}), the member is not. The likeliest: {}", families.join(", "), sentences())
         }
+        VerdictKind::Ambiguous if file.effects.is_empty() => {
+            "Something is missing, and nothing that was fitted explains it.".into()
+        }
         VerdictKind::Ambiguous => {
             format!("Several explanations remain: {}. The likeliest set: {}", rivals(), sentences())
         }

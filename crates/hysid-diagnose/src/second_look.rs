@@ -6,10 +6,14 @@
 
 use crate::base::spared;
 use crate::compose::{short_list, superposed};
+use crate::data::DataSet;
+use crate::evidence::NoiseModel;
 use crate::fitting::refit_all;
 use crate::hypothesis::{Effect, Hypothesis, block_score};
-use crate::mechanism::{Places, Shape};
+use crate::mechanism::{Places, Rewritten, Shape};
 use crate::openset::OpenSet;
+use crate::pipeline::Options;
+use crate::rehearsal::by_rehearsal;
 use crate::screen::Candidate;
 use crate::search::Search;
 use crate::weigh::better_by_chance;
@@ -32,6 +36,12 @@ const MOMENTS: f64 = 25.0;
 /// Log evidence that a set of nothing but drifts and offsets must bring besides: noise that rises towards low frequency does what they do,
 /// process noise on a drive above all.
 pub const SLOW: f64 = 8.0;
+
+/// Lines of a recording's spectrum among which the residual itself pointed to one, for each of an effect's shapes that is such a line.
+pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
+    let lines = |shape: &Shape| if shape.places == Places::Lines { (0.5 * data.rows() as f64).max(1.0) } else { 1.0 };
+    effect.shapes.iter().map(lines).product()
+}
 
 /// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
 pub fn unlikely(open: &OpenSet, odds_against: f64) -> f64 {
@@ -78,19 +88,40 @@ impl<'d> Search<'_, 'd> {
         if p >= self.options.alpha {
             return None;
         }
-        let (_, before) = block_score(self.setting, start)?;
-        let (_, after) = block_score(self.setting, best)?;
-        (after.iter().sum::<f64>() < before.iter().sum::<f64>()).then_some(p)
+        self.predicts_blocks(start, best).then_some(p)
+    }
+
+    /// Whether a set predicts blocks that it was not fitted to better than the simulation as it is.
+    fn predicts_blocks(&self, start: &Hypothesis<'d>, set: &Hypothesis<'d>) -> bool {
+        let squares = |h| block_score(self.setting, h).map(|(_, squares)| squares.iter().sum::<f64>());
+        matches!((squares(start), squares(set)), (Some(before), Some(after)) if after < before)
+    }
+
+    /// The probability, below the level of the tests, that the likeliest effects gain so much where nothing is missing, by simulation. Asked only
+    /// where the noise has a colour and is known below the lowest line (of 1/f noise no recording tells how it goes on there, and simulations of
+    /// it would promise too much), and where a set of those that were `fitted` predicts blocks better.
+    pub fn by_rehearsal(
+        &self,
+        none: &Hypothesis<'d>,
+        fitted: &[Hypothesis<'d>],
+        candidates: &[Candidate],
+        plain: Option<&(Hypothesis<'d>, Vec<Candidate>)>,
+    ) -> Option<f64> {
+        let Options { alpha, seed } = self.options;
+        let noise = &none.base.whitener;
+        if noise.coefficients() == 0 || !noise.models.iter().all(NoiseModel::is_known_below) {
+            return None;
+        }
+        let p = by_rehearsal(self.setting, none, candidates, plain, alpha, seed).filter(|p| *p < alpha)?;
+        let quick = |h: &&Hypothesis<'_>| h.effects.iter().any(|e| !e.mechanism.family.is_slow_noise());
+        let best = fitted.iter().filter(quick).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        (best.log_evidence > none.log_evidence && self.predicts_blocks(none, best)).then_some(p)
     }
 
     /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.
     fn places_of(&self, effect: &Effect) -> f64 {
-        let of_shape = |shape: &Shape| match shape.places {
-            Places::Lines => (0.5 * self.setting.data.rows() as f64).max(1.0),
-            Places::Moments => MOMENTS,
-            Places::Any => 1.0,
-        };
-        effect.written.shapes.iter().map(of_shape).product()
+        let moments = effect.written.shapes.iter().filter(|shape| shape.places == Places::Moments).count();
+        lines_of(self.setting.data, &effect.written) * MOMENTS.powi(moments as i32)
     }
 
     /// The same where the residual is mismatch throughout and no noise model can be had: a set that takes [`LARGE`] of its power or brings

@@ -33,6 +33,13 @@ pub fn weigh(h: &Hypothesis<'_>) -> Weighed {
     }
 }
 
+/// The set with the most evidence of those that claim something.
+pub fn likeliest(weighed: &[Weighed]) -> Option<usize> {
+    (0..weighed.len())
+        .filter(|&i| !weighed[i].claims.is_empty() && weighed[i].log_evidence.is_finite())
+        .max_by(|&a, &b| weighed[a].log_evidence.total_cmp(&weighed[b].log_evidence))
+}
+
 /// The sets that were fitted, as they stand against each other.
 #[derive(Debug, Clone, Copy)]
 pub struct Contest<'a, 'd> {

@@ -16,6 +16,8 @@ const DECADES: (f64, f64) = (1.0, 0.25);
 const HOPELESS: f64 = 150.0;
 /// Decades of the share of the force in the output's power that are searched.
 const RANGE: (f64, f64) = (-3.0, 9.0);
+/// Shares of a force, in the power of the sensor's noise, that are tried before any other where nothing else speaks for one.
+const HINTS: [f64; 2] = [0.03, 0.5];
 /// Rows of the longest stretch that a scale of the response is taken from.
 const SCALE_ROWS: usize = 4000;
 
@@ -51,6 +53,14 @@ impl Driven {
         }
         let chosen = coloured.filter(|c| c.1 - price > white.1).unwrap_or(white);
         Some((chosen.2, chosen.1))
+    }
+
+    /// Whether a little of a white force is likelier than the likelihood `most` of a model without one.
+    pub fn hinted(path: &ForcePath, stretches: &[&[f64]], most: f64) -> bool {
+        let rows = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
+        let unit = path.variance(0.0, rows.min(SCALE_ROWS));
+        let likelier = |share: f64| Self::with(path, 0.0, share / unit, rows, stretches).is_some_and(|(_, l)| l > most);
+        unit > 0.0 && unit.is_finite() && HINTS.into_iter().any(likelier)
     }
 
     /// The best share of a force with this pole, from a decade on by steps that shrink.
@@ -218,6 +228,31 @@ mod tests {
             assert!(w.iter().zip(&e).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs())));
         }
     }
+
+    #[test]
+    fn a_little_of_a_force_is_found_where_an_autoregression_sees_white_noise() {
+        let path = integrator();
+        let found = |size: f64| {
+            (0..5u64)
+                .filter(|&seed| {
+                    let e = simulated(&path, &white(2000, 50 + seed), size, seed);
+                    NoiseModel::fit(&[&e], 16, std::slice::from_ref(&path)).is_driven()
+                })
+                .count()
+        };
+        let seen = |size: f64| {
+            (0..5u64)
+                .filter(|&seed| {
+                    let e = simulated(&path, &white(2000, 50 + seed), size, seed);
+                    NoiseModel::fit(&[&e], 16, &[]).coefficients() > 0
+                })
+                .count()
+        };
+        assert_eq!((found(0.0), found(LITTLE), seen(LITTLE)), (0, 5, 0));
+    }
+
+    /// Of a force through an integrator that ends as high as the sensor's noise.
+    const LITTLE: f64 = 0.12;
 
     #[test]
     fn other_noise_is_not_taken_for_process_noise() {

@@ -116,19 +116,23 @@ impl NoiseModel {
                 }
             }
         }
-        if best.coefficients() == 0 {
-            return best;
-        }
         let total: usize = stretches.iter().map(|s| s.len()).sum();
         let price = 0.5 * (total as f64).ln();
+        // What looks white to an autoregression may hide a little of a force; most often it does not, and two looks tell.
+        let white = best.coefficients() == 0;
         for path in paths {
+            if white && !Driven::hinted(path, stretches, most) {
+                continue;
+            }
             let Some((driven, likelihood)) = Driven::fit(path, stretches, price, most) else { continue };
             let score = likelihood - price * driven.coefficients() as f64;
             if score > most {
                 (best, most) = (Self { kind: Kind::Driven(driven), below: Below::LEVEL }, score);
             }
         }
-        best.below = Below::rising(best.exponent(longest));
+        if best.coefficients() > 0 {
+            best.below = Below::rising(best.exponent(longest));
+        }
         best
     }
 
@@ -174,6 +178,11 @@ impl NoiseModel {
     /// Whether it is that of a force through the plant.
     pub fn is_driven(&self) -> bool {
         matches!(self.kind, Kind::Driven(_))
+    }
+
+    /// Whether it goes on below the lowest line as an equation says that holds at every frequency: a force through the plant, or an autoregression alone.
+    pub fn is_known_below(&self) -> bool {
+        matches!(self.kind, Kind::Driven(_) | Kind::Shaped(_, None))
     }
 
     /// Standard deviation of the innovations.
