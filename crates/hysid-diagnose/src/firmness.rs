@@ -44,7 +44,14 @@ pub fn firmness(
     for (i, (e, s)) in best.effects.iter().zip(&mut support).enumerate() {
         // Two members of one family in one set: something of that kind, but neither of them as it stands.
         let twice = claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family);
-        let vague = e.mechanism.family.stands_for_others() || trifle(pool, winner, i) || has_twin(pool, winner, i);
+        let own = e.mechanism.family;
+        // A fractional element is a relaxation and a mode within the band that was excited.
+        let of_a_spectrum = own.is_linear_dynamics()
+            && best
+                .effects
+                .iter()
+                .any(|o| o.mechanism.family == Family::LinearMemory && o.mechanism.id != e.mechanism.id);
+        let vague = own.stands_for_others() || of_a_spectrum || trifle(pool, winner, i) || has_twin(pool, winner, i);
         if doubtful || twice || vague {
             s.weaken();
         }

@@ -15,14 +15,14 @@ use crate::firmness::{firmness, likelihoods};
 use crate::force::pushed;
 use crate::fresh::gamble;
 use crate::hold::free_run;
-use crate::hypothesis::Setting;
+use crate::hypothesis::{Hypothesis, Setting};
 use crate::intake::{Intake, intake};
 use crate::left::Left;
 use crate::picture::Picture;
 use crate::records::*;
 use crate::reliability::recalibrate;
 use crate::screen::screen;
-use crate::search::{Search, calibrate, words};
+use crate::search::{Search, calibrate, leaves_more, words};
 use crate::second_look::{ODDS_AGAINST, unlikely};
 use crate::text::number;
 use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, verdict};
@@ -84,6 +84,21 @@ pub struct Diagnosis {
     pub augmented: Option<Simulation>,
     /// The series behind the verdict.
     pub picture: Picture,
+}
+
+/// What speaks against writing a set into the simulation, in words; `least` is the simulation as it is with the least error.
+fn veto(best: &Hypothesis<'_>, least: &Hypothesis<'_>, worse_on_blocks: bool) -> Option<&'static str> {
+    if worse_on_blocks {
+        Some(
+            "the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to",
+        )
+    } else if leaves_more(best, least) {
+        Some(
+            "the best set of effects leaves a larger error than the simulation as it is, and what it gains is that the error looks more like noise: it explains nothing",
+        )
+    } else {
+        None
+    }
 }
 
 /// Diagnoses a simulation.
@@ -244,14 +259,17 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         let noise = best.base.whitener.models.iter().map(|m| m.noise_rms()).collect::<Vec<_>>();
         file.mismatch.noise_rms = by_column(simulation, &noise);
     }
-    let vetoed = !best.effects.is_empty() && worse_on_blocks(&blocks, winner);
-    if vetoed {
+    // Under a noise of its own a simulation may leave more than it has to.
+    let least = under_white.as_ref().map_or(&pool[0], |(start, _)| start);
+    let veto = (winner > 0).then(|| veto(best, least, worse_on_blocks(&blocks, winner))).flatten();
+    let vetoed = veto.is_some();
+    if let Some(why) = veto {
         file.verdict = VerdictKind::Ambiguous;
         for e in &mut file.effects {
             e.support = e.support.min(NOT_FIRM);
             e.family_support = e.family_support.min(NOT_FIRM);
         }
-        file.notes.push("the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to, and no augmented simulation is written".into());
+        file.notes.push(format!("{why}, and no augmented simulation is written"));
     }
     if significant
         && matches!(file.verdict, VerdictKind::Family | VerdictKind::Ambiguous)

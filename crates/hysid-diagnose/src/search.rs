@@ -76,6 +76,11 @@ const SHORT_LIST: usize = 10;
 /// Plain error, over that of a set of no more effects, at which a set under a noise model takes mismatch for noise.
 const GIVEN_UP: f64 = 1.5;
 
+/// Whether a set leaves a larger plain error than the simulation without effects: its noise model explains, and the effects do not.
+pub fn leaves_more(h: &Hypothesis<'_>, none: &Hypothesis<'_>) -> bool {
+    plain_error(h, none).1 > plain_error(none, none).1
+}
+
 /// The number of effects of a set, and the plain error that it leaves, each output in units of what the simulation without effects leaves of it.
 fn plain_error(h: &Hypothesis<'_>, none: &Hypothesis<'_>) -> (usize, f64) {
     let layout = &h.base.model.data().layout;

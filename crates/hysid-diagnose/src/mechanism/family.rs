@@ -120,6 +120,12 @@ impl Family {
         matches!(self, Self::LinearMemory | Self::SensorDrift)
     }
 
+    /// Whether its members add poles and zeros to the simulation and nothing else: beside a memory that stands for any spectrum of relaxations, such a
+    /// member is one more term of it.
+    pub fn is_linear_dynamics(self) -> bool {
+        matches!(self, Self::LinearMemory | Self::ExtraMode | Self::SignalPathLag | Self::Electrical)
+    }
+
     /// The family one of whose members becomes one of this family's by a single parameter: Dahl's law is Bouc and Wen's with `gamma = 0`, a
     /// back-EMF that the viscous friction absorbs leaves the lag of the winding.
     pub fn twin(self) -> Option<Self> {
