@@ -62,6 +62,22 @@ pub fn firmness(
     support
 }
 
+/// Whether a set is a sum of relaxations: two members with a linear memory, or one beside a mode at the same slot. One relaxation is an element; two in
+/// one recording are what a memory with many time scales looks like (a fractional element), and the catalogue has no law of that kind.
+pub fn is_a_spectrum(h: &Hypothesis<'_>) -> bool {
+    let memories = h.effects.iter().enumerate().filter(|(_, e)| e.mechanism.family == Family::LinearMemory);
+    memories.into_iter().any(|(i, memory)| {
+        h.effects.iter().enumerate().any(|(j, other)| {
+            let more = match other.mechanism.family {
+                Family::LinearMemory => true,
+                Family::ExtraMode => other.slot.label == memory.slot.label,
+                _ => false,
+            };
+            i != j && more
+        })
+    })
+}
+
 /// Whether a member of a set adds next to nothing beside what the others explain, where the set without it was fitted.
 fn trifle(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let rest = pool[winner].key_without(member);

@@ -5,6 +5,7 @@ use crate::budget::Step;
 use crate::evidence::SurrogateTest;
 use crate::file::finite;
 use crate::file::{CorrectionRecord, RemainingRecord};
+use crate::firmness::is_a_spectrum;
 use crate::hypothesis::{Hypothesis, block_score};
 use crate::openset::OpenSet;
 use crate::records::noise_floor;
@@ -33,6 +34,8 @@ pub struct Left {
     instead: Option<OpenSet>,
     /// Whether generic terms explain so much that the set is an imitation.
     pub foreign: bool,
+    /// Whether the set is a sum of relaxations, which stands for a memory with many time scales.
+    pub spectrum: bool,
     /// Whether something significant is left.
     pub imperfect: bool,
     alpha: f64,
@@ -48,15 +51,18 @@ impl Left {
         let open = if significant { search.open(best) } else { None };
         let seen = open.as_ref().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
         let explained = best.log_evidence - none.log_evidence;
-        let instead = if winner > 0 { search.open(none) } else { None };
-        let instead = instead.filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE);
+        let spectrum = is_a_spectrum(best);
+        let generic = if winner > 0 { search.open(none) } else { None };
+        let instead =
+            generic.clone().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE);
         let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || instead.is_some());
         // What was not looked at is not known to be nothing.
         let significant = |t: &SurrogateTest| t.p_value < alpha;
-        let imperfect = winner > 0 && (foreign || seen.is_some() || test.as_ref().is_none_or(significant));
+        let imperfect = winner > 0 && (foreign || spectrum || seen.is_some() || test.as_ref().is_none_or(significant));
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let instead = instead.filter(|i| i.gain > explained + open.as_ref().map_or(0.0, |o| o.gain));
-        Self { test, open, instead, foreign, imperfect, alpha }
+        let instead = if spectrum { generic } else { instead };
+        Self { test, open, instead, foreign, spectrum, imperfect, alpha }
     }
 
     /// As it is reported; `None` where it was not looked at.
@@ -74,7 +80,7 @@ impl Left {
         let Some(remaining) = remaining else { return self.open.as_ref().is_some_and(|o| self.stands(o)) };
         let helps = self.open.as_ref().is_some_and(|o| o.block_ratio < BETTER);
         let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
-        self.foreign || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
+        self.foreign || self.spectrum || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more

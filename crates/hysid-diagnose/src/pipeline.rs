@@ -304,6 +304,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     };
     if modelled.is_some() {
         file.notes.push("the augmented simulation holds the sparse correction, refitted, and no physics that has a name: it predicts blocks of the recordings that it was not fitted to better, and says nothing outside their range".into());
+    } else if left.spectrum {
+        file.notes.push("several relaxations stand beside each other: a memory with many time scales (a fractional element, a spectrum of relaxation times), which the catalogue does not have; within the band of the recording their sum follows it".into());
     } else if left.foreign && !vetoed && budget.unfinished() {
         file.notes.push("generic terms explain far more than the effects that were fitted in time; no augmented simulation is written".into());
     } else if left.foreign && !vetoed {
@@ -311,6 +313,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     }
     let written = modelled.as_ref().or((named > 0).then_some(best));
     let last = modelled.as_ref().unwrap_or(best);
+    let spectrum = left.spectrum.then_some(
+        "a memory with many time scales were at work, a fractional element or a spectrum of relaxation times",
+    );
     let (correction, varying) = left.believed().unzip();
     file.correction = correction;
     let varying = varying.flatten();
@@ -326,7 +331,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
     file.notes.extend(lacking(best, &candidates));
-    file.summary = summary(&file, varying.as_deref());
+    file.summary = summary(&file, varying.as_deref().or(spectrum));
     if let Some(note) = budget.note() {
         if unexplained {
             file.summary = "Something is missing; the search was cut short by the time limit before an effect was found that explains it.".into();

@@ -164,8 +164,8 @@ impl Case {
         let simulation = simulation(&design, &declared, regularised, initial);
         let names = kind.parameters();
         let mut effects: Vec<Concealed> = machine.effects.iter().map(|e| concealed(&design, e)).collect();
-        if let ([only], Some(law)) = (effects.as_mut_slice(), simpler(&design, &tuned)) {
-            only.same.push((law.name(), law.family()));
+        for (i, law) in simpler(&design, &tuned) {
+            effects[i].same.push((law.name(), law.family()));
         }
         let label = Label {
             id: wanted.id.clone(),

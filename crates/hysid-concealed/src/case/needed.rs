@@ -29,9 +29,22 @@ pub(super) fn all_needed(design: &Design, tuned: &Tuned) -> bool {
         })
 }
 
-/// The simpler law of the catalogue that a single effect cannot be told from in this recording, where its law has one as a special case.
-pub(super) fn simpler(design: &Design, tuned: &Tuned) -> Option<Law> {
-    let [e] = tuned.machine.effects.as_slice() else { return None };
+/// Simpler laws of the catalogue that effects cannot be told from in this recording beside the others, refitted, where their laws have one as a
+/// special case: place of the effect, and the law.
+pub(super) fn simpler(design: &Design, tuned: &Tuned) -> Vec<(usize, Law)> {
+    let effects = &tuned.machine.effects;
+    let imitated = |(i, e): (usize, &Effect)| {
+        let other = special_case(e)?;
+        let law = other.law;
+        let mut all = effects.clone();
+        all[i] = other;
+        left(design, tuned, all).filter(|l| *l < LEAST_INFORMATION).map(|_| (i, law))
+    };
+    effects.iter().enumerate().filter_map(imitated).collect()
+}
+
+/// The special case of an effect's law that is a law of its own, with the parameters that they share.
+fn special_case(e: &Effect) -> Option<Effect> {
     let (law, p) = match e.law {
         Law::LuGre => (Law::Dahl, vec![e.p[0], e.p[3]]),
         Law::Elastoplastic => (Law::Dahl, vec![e.p[0], e.p[1]]),
@@ -42,6 +55,5 @@ pub(super) fn simpler(design: &Design, tuned: &Tuned) -> Option<Law> {
         Law::AsymmetricBoucWen | Law::Pinching | Law::Degradation => (Law::BoucWen, e.p[..4].to_vec()),
         _ => return None,
     };
-    let other = Effect { law, p, ..e.clone() };
-    left(design, tuned, vec![other]).filter(|l| *l < LEAST_INFORMATION).map(|_| law)
+    Some(Effect { law, p, ..e.clone() })
 }
