@@ -179,10 +179,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
             Some((start, found)) => plainly.on_blocks(start, &plainly.glance(start, found)),
             None => {
                 search.glance(&none, &candidates).into_iter().for_each(|h| add(&mut pool, h));
-                search.by_chance(&none, &pool, candidates.len()).or_else(|| {
-                    (hooks.progress)("rehearsing on simulated recordings in which nothing is missing");
-                    search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref())
-                })
+                search
+                    .by_chance(&none, &pool, candidates.len())
+                    .or_else(|| search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref()))
             }
         };
         let seen =

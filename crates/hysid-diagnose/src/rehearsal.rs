@@ -1,8 +1,8 @@
 //! The second look rehearsed: how much evidence the likeliest effects gain on recordings in which nothing is missing, on the user's own input.
 //!
-//! Surrogates hold the noise model fixed. Noise that passes through a plant which integrates, or rises towards low frequency, is known by a few
-//! coefficients that an effect changes when it is fitted, so that most of a true effect is noise to a surrogate, and what an effect gains
-//! with a noise model of its own follows no law that is known beforehand. It is therefore simulated: the fitted simulation without effects answers the
+//! Surrogates hold the noise model fixed. Noise that passes through a plant which integrates is known by a few coefficients that an effect changes
+//! when it is fitted, so that most of a true effect is noise to a surrogate, and what an effect gains with a noise model of its own follows
+//! no law that is known beforehand. It is therefore simulated: the fitted simulation without effects answers the
 //! recorded input, noise is drawn from its noise model with the whitened residual's own distribution, and the same few effects are chosen and
 //! fitted as on the recording itself, each with a noise model of its own.
 //!

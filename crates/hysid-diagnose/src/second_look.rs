@@ -112,6 +112,7 @@ impl<'d> Search<'_, 'd> {
         if noise.coefficients() == 0 || !noise.models.iter().all(NoiseModel::is_known_below) {
             return None;
         }
+        (self.hooks.progress)("rehearsing on simulated recordings in which nothing is missing");
         let p = by_rehearsal(self.setting, none, candidates, plain, alpha, seed).filter(|p| *p < alpha)?;
         let quick = |h: &&Hypothesis<'_>| h.effects.iter().any(|e| !e.mechanism.family.is_slow_noise());
         let best = fitted.iter().filter(quick).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;

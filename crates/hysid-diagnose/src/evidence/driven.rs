@@ -251,7 +251,7 @@ mod tests {
         assert_eq!((found(0.0), found(LITTLE), seen(LITTLE)), (0, 5, 0));
     }
 
-    /// Of a force through an integrator that ends as high as the sensor's noise.
+    /// Size of a force through an integrator of which autoregressions see nothing in 2000 samples.
     const LITTLE: f64 = 0.12;
 
     #[test]
