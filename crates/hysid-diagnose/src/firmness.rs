@@ -46,11 +46,8 @@ pub fn firmness(
         let twice = claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family);
         let own = e.mechanism.family;
         // A fractional element is a relaxation and a mode within the band that was excited.
-        let of_a_spectrum = own.is_linear_dynamics()
-            && best
-                .effects
-                .iter()
-                .any(|o| o.mechanism.family == Family::LinearMemory && o.mechanism.id != e.mechanism.id);
+        let of_a_spectrum =
+            own.extends_a_spectrum() && best.effects.iter().any(|o| o.mechanism.family == Family::LinearMemory);
         let vague = own.stands_for_others() || of_a_spectrum || trifle(pool, winner, i) || has_twin(pool, winner, i);
         if doubtful || twice || vague {
             s.weaken();

@@ -53,15 +53,15 @@ impl Left {
         let explained = best.log_evidence - none.log_evidence;
         let spectrum = is_a_spectrum(best);
         let generic = if winner > 0 { search.open(none) } else { None };
-        let instead =
-            generic.clone().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE);
-        let foreign = winner > 0 && (seen.is_some_and(|o| o.gain > AS_MUCH * explained) || instead.is_some());
+        let outdone = |o: &OpenSet| unlikely(o, ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
+        let outdone = generic.as_ref().is_some_and(outdone);
+        let foreign = winner > 0 && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
         // What was not looked at is not known to be nothing.
         let significant = |t: &SurrogateTest| t.p_value < alpha;
         let imperfect = winner > 0 && (foreign || spectrum || seen.is_some() || test.as_ref().is_none_or(significant));
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
-        let instead = instead.filter(|i| i.gain > explained + open.as_ref().map_or(0.0, |o| o.gain));
-        let instead = if spectrum { generic } else { instead };
+        let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
+        let instead = generic.filter(|g| spectrum || (outdone && g.gain > both));
         Self { test, open, instead, foreign, spectrum, imperfect, alpha }
     }
 

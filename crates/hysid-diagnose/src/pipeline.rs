@@ -260,7 +260,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     }
     // Under a noise of its own a simulation may leave more than it has to.
     let least = under_white.as_ref().map_or(&pool[0], |(start, _)| start);
-    let veto = (winner > 0).then(|| veto(best, least, worse_on_blocks(&blocks, winner))).flatten();
+    let veto = if winner > 0 { veto(best, least, worse_on_blocks(&blocks, winner)) } else { None };
     let vetoed = veto.is_some();
     if let Some(why) = veto {
         file.verdict = VerdictKind::Ambiguous;

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::base::{Base, spared};
 use crate::budget::Step;
 use crate::data::DataSet;
-use crate::evidence::{Projector, Whitener, norm2, score};
+use crate::evidence::{Projector, norm2, score};
 use crate::fitting::set;
 use crate::hypothesis::{Hypothesis, Setting};
 use crate::random::generator;
@@ -45,7 +45,7 @@ struct List<'a, 'd> {
 impl<'a> List<'a, '_> {
     /// The candidates that explain most of a residual, each at its best point, with the amplitudes there. What slow noise does is none of them: no
     /// recording tells how its noise goes on below the lowest line.
-    fn likeliest(&self, residual: &[f64]) -> Vec<(&'a Candidate, &'a Point, Vec<f64>, &'a Whitener)> {
+    fn likeliest(&self, residual: &[f64]) -> Vec<(&'a Candidate, &'a Point, Vec<f64>)> {
         let mut r = self.base.whitener.apply(&self.base.model.data().layout, residual);
         self.own.remove(&mut r);
         let total = norm2(&r);
@@ -63,7 +63,7 @@ impl<'a> List<'a, '_> {
             })
             .collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        found.into_iter().take(LOOKED_AT).map(|(_, c, p, amplitudes)| (c, p, amplitudes, &self.base.whitener)).collect()
+        found.into_iter().take(LOOKED_AT).map(|(_, c, p, amplitudes)| (c, p, amplitudes)).collect()
     }
 }
 
@@ -87,7 +87,8 @@ fn largest_gain(
     let evidence = |b: &Base<'_>| setting.evidence(b) + spared(setting.data, &b.whitener, &start.whitener);
     let nothing = evidence(&start);
     let mut best: Option<f64> = None;
-    for (candidate, point, amplitudes, noise) in lists.iter().flat_map(|l| l.likeliest(residual)) {
+    let chosen = lists.iter().flat_map(|l| l.likeliest(residual).into_iter().map(move |c| (&l.base.whitener, c)));
+    for (noise, (candidate, point, amplitudes)) in chosen {
         let document = &candidate.refit.simulation;
         let mut from =
             with_added_starts(&start.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
@@ -216,7 +217,7 @@ mod tests {
         }
     }
 
-    /// An oscillator with a cubic spring of this share under autoregressive noise.
+    /// An oscillator with a cubic spring of this stiffness, in N/m^3, under autoregressive noise.
     fn recorded(seed: u64, cubic: f64) -> DataSet {
         let mut random = normal(seed);
         let u = drive(800, &mut random);
@@ -267,6 +268,6 @@ mod tests {
         assert!(p < 0.005, "{p}");
     }
 
-    /// Of such a size that the spring gains some 10 nats.
+    /// Stiffness of the cubic spring that is to be seen, in N/m^3.
     const CUBIC: f64 = 60.0;
 }

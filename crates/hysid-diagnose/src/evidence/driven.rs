@@ -57,19 +57,23 @@ impl Driven {
 
     /// Whether a little of a white force is likelier than the likelihood `most` of a model without one.
     pub fn hinted(path: &ForcePath, stretches: &[&[f64]], most: f64) -> bool {
-        let rows = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
-        let unit = path.variance(0.0, rows.min(SCALE_ROWS));
-        let likelier = |share: f64| Self::with(path, 0.0, share / unit, rows, stretches).is_some_and(|(_, l)| l > most);
-        unit > 0.0 && unit.is_finite() && HINTS.into_iter().any(likelier)
+        Self::scale(path, 0.0, stretches).is_some_and(|(rows, unit)| {
+            HINTS.into_iter().any(|share| {
+                Self::with(path, 0.0, share / unit, rows, stretches).is_some_and(|(_, likelihood)| likelihood > most)
+            })
+        })
+    }
+
+    /// Rows of the longest stretch, and the output's variance there for a force of unit variance; `None` where nothing finite passes.
+    fn scale(path: &ForcePath, pole: f64, stretches: &[&[f64]]) -> Option<(usize, f64)> {
+        let rows = stretches.iter().map(|s| s.len()).max()?;
+        let unit = path.variance(pole, rows.min(SCALE_ROWS));
+        (unit > 0.0 && unit.is_finite()).then_some((rows, unit))
     }
 
     /// The best share of a force with this pole, from a decade on by steps that shrink.
     fn search(path: &ForcePath, pole: f64, stretches: &[&[f64]], (start, step): (f64, f64)) -> Option<Point> {
-        let rows = stretches.iter().map(|s| s.len()).max()?;
-        let unit = path.variance(pole, rows.min(SCALE_ROWS));
-        if !(unit > 0.0 && unit.is_finite()) {
-            return None;
-        }
+        let (rows, unit) = Self::scale(path, pole, stretches)?;
         let at = |t: f64| -> Option<Point> {
             let (driven, likelihood) = Self::with(path, pole, 10f64.powf(t) / unit, rows, stretches)?;
             Some((t, likelihood, driven))
@@ -232,23 +236,13 @@ mod tests {
     #[test]
     fn a_little_of_a_force_is_found_where_an_autoregression_sees_white_noise() {
         let path = integrator();
-        let found = |size: f64| {
-            (0..5u64)
-                .filter(|&seed| {
-                    let e = simulated(&path, &white(2000, 50 + seed), size, seed);
-                    NoiseModel::fit(&[&e], 16, std::slice::from_ref(&path)).is_driven()
-                })
-                .count()
-        };
-        let seen = |size: f64| {
-            (0..5u64)
-                .filter(|&seed| {
-                    let e = simulated(&path, &white(2000, 50 + seed), size, seed);
-                    NoiseModel::fit(&[&e], 16, &[]).coefficients() > 0
-                })
-                .count()
-        };
-        assert_eq!((found(0.0), found(LITTLE), seen(LITTLE)), (0, 5, 0));
+        for seed in 0..5 {
+            let recorded = |size: f64| simulated(&path, &white(2000, 50 + seed), size, seed);
+            let fit = |e: &[f64], paths: &[ForcePath]| NoiseModel::fit(&[e], 16, paths);
+            assert!(!fit(&recorded(0.0), std::slice::from_ref(&path)).is_driven(), "{seed}");
+            assert!(fit(&recorded(LITTLE), std::slice::from_ref(&path)).is_driven(), "{seed}");
+            assert_eq!(fit(&recorded(LITTLE), &[]).coefficients(), 0, "{seed}");
+        }
     }
 
     /// Size of a force through an integrator of which autoregressions see nothing in 2000 samples.

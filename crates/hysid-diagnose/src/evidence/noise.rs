@@ -130,9 +130,7 @@ impl NoiseModel {
                 (best, most) = (Self { kind: Kind::Driven(driven), below: Below::LEVEL }, score);
             }
         }
-        if best.coefficients() > 0 {
-            best.below = Below::rising(best.exponent(longest));
-        }
+        best.below = Below::rising(best.exponent(longest));
         best
     }
 

@@ -120,10 +120,10 @@ impl Family {
         matches!(self, Self::LinearMemory | Self::SensorDrift)
     }
 
-    /// Whether its members add poles and zeros to the simulation and nothing else: beside a memory that stands for any spectrum of relaxations, such a
-    /// member is one more term of it.
-    pub fn is_linear_dynamics(self) -> bool {
-        matches!(self, Self::LinearMemory | Self::ExtraMode | Self::SignalPathLag | Self::Electrical)
+    /// Whether its members add poles and zeros to the simulation and nothing else: beside a linear memory, which stands for any spectrum of
+    /// relaxations, such a member is one more term of it.
+    pub fn extends_a_spectrum(self) -> bool {
+        matches!(self, Self::ExtraMode | Self::SignalPathLag | Self::Electrical)
     }
 
     /// The family one of whose members becomes one of this family's by a single parameter: Dahl's law is Bouc and Wen's with `gamma = 0`, a
