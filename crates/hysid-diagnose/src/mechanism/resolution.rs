@@ -1,8 +1,10 @@
 //! The step of a quantised signal, with or without noise on top of the steps.
 //!
-//! Values on a grid repeat themselves. Where noise was added behind the quantiser none does, but the mean of `exp(2 pi i y/q)` over the
-//! samples (the empirical characteristic function at the grid's frequency) stands out: it is `exp(-2 (pi sigma/q)^2)` there, and next to nothing
-//! where a smooth distribution covers many steps.
+//! Values on a grid repeat themselves. Where noise was added behind the quantiser none does, but two sums stand out at the grid's frequency
+//! `1/q`. That of `exp(2 pi i y/q)` over the samples `y` (the empirical characteristic function) is `exp(-2 (pi sigma/q)^2)` of their number there, and
+//! next to nothing where a smooth distribution covers many steps. And the error `e` of a simulation `x` of the unquantised signal is a sawtooth of `x/q`,
+//! so that the sum of `e exp(2 pi i x/q)` stands out, and the error falls where the sawtooth is taken off. The second sees steps that noise
+//! hides in the values, and does not take the levels of a command for steps.
 //!
 //! Reference: B. Widrow, I. Kollár, Quantization Noise, Cambridge University Press (2008), ch. 4.
 
@@ -12,19 +14,25 @@ use std::f64::consts::TAU;
 const FEWEST: f64 = 6.0;
 /// Steps that it may cover at most: finer ones do not matter beside any noise.
 const MOST: f64 = 400.0;
+/// Values that a search needs.
+const FEWEST_VALUES: usize = 200;
 /// Points of the search for each step that the signal may cover.
 const DENSITY: f64 = 4.0;
-/// Size of the characteristic function that a grid shows at least.
-const VISIBLE: f64 = 0.3;
-/// Times the median over all steps that it must stand out.
+/// Odds against so large a sum by chance, at any of the steps that are searched.
+const ODDS: f64 = 1000.0;
+/// Times the median of the neighbouring steps that it must stand out, and how many neighbours on each side: ends and turning points of a signal
+/// have a wide characteristic function, a grid has a line.
 const ABOVE: f64 = 5.0;
+const AROUND: usize = 40;
+/// Largest peaks at which a simulated signal is rounded.
+const PEAKS: usize = 12;
 
-/// The step of these values; `None` where they show none.
-pub fn resolution(values: &[f64]) -> Option<f64> {
+/// The step of these values, of which a simulation without steps says what they would be; `None` where they show none.
+pub fn resolution(values: &[f64], simulated: &[f64]) -> Option<f64> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     // A converter behind the noise has steps of its own, which are finer.
-    match (repeated(&sorted), blurred(&sorted)) {
+    match (repeated(&sorted), sawtooth(values, simulated).or_else(|| blurred(&sorted))) {
         (Some(fine), Some(coarse)) if coarse < 3.0 * fine => Some(fine),
         (fine, coarse) => coarse.or(fine),
     }
@@ -47,53 +55,118 @@ fn repeated(sorted: &[f64]) -> Option<f64> {
     (step > 0.0).then_some(step)
 }
 
-/// The step that sorted values with noise on top of it cluster at.
-fn blurred(sorted: &[f64]) -> Option<f64> {
-    let range = sorted.last()? - sorted.first()?;
-    if sorted.len() < 200 || range <= 0.0 {
-        return None;
-    }
-    let points = ((MOST - FEWEST) * DENSITY) as usize;
-    let spacing = 1.0 / (DENSITY * range);
-    // Turned by the same angle from one frequency to the next: one product of complex numbers for each.
-    let turns: Vec<(f64, f64)> = sorted.iter().map(|v| (TAU * v * spacing).sin_cos()).map(|(s, c)| (c, s)).collect();
-    let mut now: Vec<(f64, f64)> =
-        sorted.iter().map(|v| (TAU * v * FEWEST / range).sin_cos()).map(|(s, c)| (c, s)).collect();
-    let mut sizes = Vec::with_capacity(points);
-    for _ in 0..points {
-        let (mut re, mut im) = (0.0, 0.0);
-        for (n, t) in now.iter_mut().zip(&turns) {
-            re += n.0;
-            im += n.1;
-            *n = (n.0 * t.0 - n.1 * t.1, n.0 * t.1 + n.1 * t.0);
-        }
-        sizes.push(f64::hypot(re, im) / sorted.len() as f64);
-    }
-    let best = (0..points).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]))?;
-    let mut ordered = sizes.clone();
-    ordered.sort_by(f64::total_cmp);
-    if sizes[best] < VISIBLE || sizes[best] < ABOVE * ordered[points / 2] {
-        return None;
-    }
-    // The peak is as wide as the search's spacing; the size is searched to a thousandth of it.
-    let size = |f: f64| {
-        let (re, im) = sorted.iter().fold((0.0, 0.0), |(re, im), v| {
-            let (s, c) = (TAU * v * f).sin_cos();
-            (re + c, im + s)
-        });
-        f64::hypot(re, im)
+/// The step that values with noise on top of it cluster at.
+fn blurred(values: &[f64]) -> Option<f64> {
+    let weights = vec![1.0; values.len()];
+    let search = Search::new(values, &weights)?;
+    let sizes = search.sizes();
+    // The square of such a size follows the standard exponential law by chance.
+    let large = (0..sizes.len()).filter(|i| sizes[*i] > chance(sizes.len()).sqrt());
+    let prominence = |i: usize| sizes[i] / median(&sizes[i.saturating_sub(AROUND)..(i + AROUND + 1).min(sizes.len())]);
+    let (best, prominent) = large.map(|i| (i, prominence(i))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (prominent >= ABOVE).then(|| 1.0 / search.refined(best))
+}
+
+/// The step by whose rounding a simulated signal comes closer to the values, by so much as chance does at none of the steps that are searched.
+fn sawtooth(values: &[f64], simulated: &[f64]) -> Option<f64> {
+    let pairs = values.iter().zip(simulated).filter(|(v, x)| v.is_finite() && x.is_finite());
+    let (at, errors): (Vec<f64>, Vec<f64>) = pairs.map(|(v, x)| (*x, v - x)).unzip();
+    let search = Search::new(&at, &errors)?;
+    let sizes = search.sizes();
+    let mut peaks: Vec<usize> =
+        (1..sizes.len().saturating_sub(1)).filter(|&i| sizes[i] >= sizes[i - 1] && sizes[i] > sizes[i + 1]).collect();
+    peaks.sort_by(|a, b| sizes[*b].total_cmp(&sizes[*a]));
+    let power = |q: Option<f64>| -> f64 {
+        let rounding = |x: f64| q.map_or(0.0, |q| q * (x / q).round() - x);
+        at.iter().zip(&errors).map(|(x, e)| (e - rounding(*x)).powi(2)).sum()
     };
-    let mut at = FEWEST / range + best as f64 * spacing;
-    let mut step = 0.5 * spacing;
-    while step > 5e-4 * spacing {
-        let here = size(at);
-        let better = [at - step, at + step].into_iter().find(|f| size(*f) > here);
-        match better {
-            Some(f) => at = f,
-            None => step *= 0.5,
-        }
+    let whole = power(None);
+    // Log likelihood: both errors as white noise of unknown size.
+    let gain = |q: f64| 0.5 * at.len() as f64 * (whole / power(Some(q))).ln();
+    let steps = peaks.into_iter().take(PEAKS).map(|i| 1.0 / search.refined(i)).map(|q| (q, gain(q)));
+    let (q, gain) = steps.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (gain > chance(sizes.len())).then_some(q)
+}
+
+/// Logarithm of the odds against a step at any of so many places.
+fn chance(places: usize) -> f64 {
+    (places as f64 * ODDS).ln()
+}
+
+/// The search for a line in the sum of weights that are turned by values.
+struct Search<'a> {
+    values: &'a [f64],
+    weights: &'a [f64],
+    lowest: f64,
+    range: f64,
+    norm: f64,
+}
+
+impl<'a> Search<'a> {
+    /// `None` where there are too few values, or all are one.
+    fn new(values: &'a [f64], weights: &'a [f64]) -> Option<Self> {
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (range, norm) = (high - low, weights.iter().map(|w| w * w).sum::<f64>().sqrt());
+        let usable = range > 0.0 && range.is_finite() && norm > 0.0 && norm.is_finite();
+        (values.len() >= FEWEST_VALUES && usable).then_some(Self { values, weights, lowest: low, range, norm })
     }
-    Some(1.0 / at)
+
+    /// The frequency of a place of the search.
+    fn at(&self, place: usize) -> f64 {
+        (FEWEST + place as f64 / DENSITY) / self.range
+    }
+
+    fn turned(&self, value: f64, frequency: f64) -> (f64, f64) {
+        (TAU * (value - self.lowest) * frequency).sin_cos()
+    }
+
+    /// The size of the sum at each place, in units of what chance gives it.
+    fn sizes(&self) -> Vec<f64> {
+        let places = ((MOST - FEWEST) * DENSITY) as usize;
+        let spacing = 1.0 / (DENSITY * self.range);
+        // Turned by the same angle from one frequency to the next: one product of complex numbers for each.
+        let turns: Vec<(f64, f64)> = self.values.iter().map(|v| self.turned(*v, spacing)).collect();
+        let first = self.values.iter().map(|v| self.turned(*v, self.at(0)));
+        let mut now: Vec<(f64, f64)> = first.zip(self.weights).map(|((s, c), w)| (w * s, w * c)).collect();
+        let mut sizes = Vec::with_capacity(places);
+        for _ in 0..places {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (n, t) in now.iter_mut().zip(&turns) {
+                im += n.0;
+                re += n.1;
+                *n = (n.0 * t.1 + n.1 * t.0, n.1 * t.1 - n.0 * t.0);
+            }
+            sizes.push(f64::hypot(re, im) / self.norm);
+        }
+        sizes
+    }
+
+    /// The frequency of the peak at a place, which is as wide as the search's spacing, to a thousandth of it.
+    fn refined(&self, place: usize) -> f64 {
+        let size = |f: f64| {
+            let turned = self.values.iter().map(|v| self.turned(*v, f)).zip(self.weights);
+            let (im, re) = turned.fold((0.0, 0.0), |(im, re), ((s, c), w)| (im + w * s, re + w * c));
+            f64::hypot(re, im)
+        };
+        let mut at = self.at(place);
+        let mut step = 0.5 / (DENSITY * self.range);
+        let least = 1e-3 * step;
+        while step > least {
+            let here = size(at);
+            let better = [at - step, at + step].into_iter().find(|f| size(*f) > here);
+            match better {
+                Some(f) => at = f,
+                None => step *= 0.5,
+            }
+        }
+        at
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
@@ -108,18 +181,50 @@ mod tests {
         (0..n).map(|i| i as f64 * 0.031).map(|t| 3.0 * t.sin() + 1.1 * (2.7 * t + 0.4).sin()).collect()
     }
 
-    fn rounded(q: f64, sigma: f64) -> Vec<f64> {
+    /// Of the smooth signal.
+    const RANGE: f64 = 8.2;
+
+    /// A smooth signal rounded to steps with noise behind, and with the smooth signal itself.
+    fn rounded(q: f64, sigma: f64) -> (Vec<f64>, Vec<f64>) {
         let mut rng = generator(3, 0);
         let noise = |rng: &mut _| sigma * Distribution::<f64>::sample(&StandardNormal, rng);
-        smooth(2000).iter().map(|v| q * (v / q).round() + noise(&mut rng)).collect()
+        let x = smooth(2000);
+        (x.iter().map(|v| q * (v / q).round() + noise(&mut rng)).collect(), x)
+    }
+
+    fn found(q: f64, found: Option<f64>, what: &str) {
+        let found = found.unwrap_or_else(|| panic!("{q} {what}: none"));
+        // In steps, over the range of the signal.
+        let off = (found / q - 1.0).abs() * RANGE / q;
+        assert!(off < 0.1, "{q} {what}: {found}, {off} steps off");
     }
 
     #[test]
     fn a_step_is_found_under_noise_and_without() {
-        for (q, sigma) in [(0.2, 0.0), (0.2, 0.02), (0.2, 0.04), (0.03, 0.003), (0.9, 0.09)] {
-            let found = resolution(&rounded(q, sigma)).unwrap_or_else(|| panic!("{q} with {sigma}: none"));
-            assert!((found / q - 1.0).abs() < 2e-3, "{q} with {sigma}: {found}");
+        // A rounding error has an rms of 0.29 of the step: the last is noise as large.
+        for (q, sigma) in [(0.2, 0.0), (0.2, 0.02), (0.2, 0.04), (0.03, 0.003), (0.9, 0.09), (0.1, 0.029)] {
+            let (values, simulated) = rounded(q, sigma);
+            found(q, resolution(&values, &[]), "by values alone");
+            found(q, resolution(&values, &simulated), "beside a simulation");
         }
+    }
+
+    #[test]
+    fn beside_a_simulation_steps_below_the_noise_are_found() {
+        let (values, simulated) = rounded(0.1, 0.1);
+        assert_eq!(resolution(&values, &[]), None);
+        found(0.1, resolution(&values, &simulated), "below the noise");
+    }
+
+    /// A command that stays at a few levels: its values cluster, and not in steps.
+    #[test]
+    fn levels_are_no_steps() {
+        let mut rng = generator(5, 0);
+        let levels: Vec<f64> = (0..12).map(|_| rng.random::<f64>()).collect();
+        let at: Vec<f64> = (0..1200).map(|i| levels[i / 100]).collect();
+        let recorded: Vec<f64> =
+            at.iter().map(|v| v + 0.01 * Distribution::<f64>::sample(&StandardNormal, &mut rng)).collect();
+        assert_eq!(sawtooth(&recorded, &at), None);
     }
 
     #[test]
@@ -127,10 +232,11 @@ mod tests {
         let mut rng = generator(4, 0);
         let uniform: Vec<f64> = (0..1500).map(|_| rng.random::<f64>()).collect();
         let sine: Vec<f64> = (0..1000).map(|i| (i as f64 * 0.01).sin()).collect();
+        let dithered = rounded(0.2, 0.2).0;
         for (name, values) in
-            [("two sines", smooth(2000)), ("uniform", uniform), ("a sine", sine), ("dithered", rounded(0.2, 0.2))]
+            [("two sines", smooth(2000)), ("uniform", uniform), ("a sine", sine), ("dithered", dithered)]
         {
-            assert_eq!(resolution(&values), None, "{name}");
+            assert_eq!(resolution(&values, &[]), None, "{name}");
         }
     }
 }

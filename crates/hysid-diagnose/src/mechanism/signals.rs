@@ -181,7 +181,7 @@ impl Signals {
 
     /// The step of the recorded output, where it shows one.
     pub fn resolution(&self) -> Option<f64> {
-        resolution(self.measured.as_ref()?)
+        resolution(self.measured.as_ref()?, self.series("y").unwrap_or_default())
     }
 }
 
