@@ -2,7 +2,7 @@
 
 use crate::budget::Step;
 use crate::hypothesis::{Effect, Hypothesis, Setting};
-use crate::mechanism::numerics::{SOLVER_ARTEFACT, variants};
+use crate::mechanism::numerics::{SHARPER, SOLVER_ARTEFACT, variants};
 use crate::mechanism::{Purpose, Rewritten};
 use crate::slot::{Slot, Structure};
 
@@ -47,7 +47,7 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
             // Further the same way.
             let further = variants(&document, setting.data.period_s).into_iter().find(|v| v.what == variant.what);
             match further.and_then(|v| v.simulation) {
-                Some(next) if round + 1 < AGAIN && variant.what.starts_with("smoothed") => document = next,
+                Some(next) if round + 1 < AGAIN && variant.what == SHARPER => document = next,
                 _ => break,
             }
         }

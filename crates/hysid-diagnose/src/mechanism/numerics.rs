@@ -35,6 +35,11 @@ pub struct Variant {
     pub simulation: Option<Simulation>,
 }
 
+/// The place of a smoothed friction law taken by one that sticks.
+const STICKS: &str = "friction that sticks in the place of a smoothed law";
+/// A smoothed friction law made sharper, which can be done again.
+pub const SHARPER: &str = "smoothed friction three times as sharp";
+
 /// The variants of a simulation whose outputs are to be compared with its own.
 ///
 /// `period_s` is the recording's sampling period. The half-sample shifts are made with `delay`: of the inputs (the recording's
@@ -59,20 +64,27 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
     if late.validate().is_ok() {
         found.push(Variant { what: "outputs half a sample late", simulation: Some(late) });
     }
-    let mut sharper = simulation.clone();
-    let mut smoothed = false;
-    sharper.map_equations(|e| {
-        e.map(&mut |e| match e {
-            Expr::Call(Function::Tanh, arguments) if uses_state(simulation, &arguments) => {
-                smoothed = true;
-                let steeper = arguments.into_iter().map(|a| Expr::Number(3.0) * a).collect();
-                Expr::Call(Function::Tanh, steeper)
-            }
-            other => other,
-        })
+    let replaced = |law: &dyn Fn(Vec<Expr>) -> Expr| {
+        let mut other = simulation.clone();
+        let mut smoothed = false;
+        other.map_equations(|e| {
+            e.map(&mut |e| match e {
+                Expr::Call(Function::Tanh, arguments) if uses_state(simulation, &arguments) => {
+                    smoothed = true;
+                    law(arguments)
+                }
+                other => other,
+            })
+        });
+        smoothed.then_some(other)
+    };
+    // However sharp a smoothed law is, it creeps where the machine sticks, and the sharper it is, the more steps it needs.
+    let sticks = replaced(&|arguments| Expr::Call(Function::Sign, arguments));
+    let sharper = replaced(&|arguments| {
+        Expr::Call(Function::Tanh, arguments.into_iter().map(|a| Expr::Number(3.0) * a).collect())
     });
-    if smoothed {
-        found.push(Variant { what: "smoothed friction three times as sharp", simulation: Some(sharper) });
+    for (what, other) in [(STICKS, sticks), (SHARPER, sharper)] {
+        found.extend(other.map(|s| Variant { what, simulation: Some(s) }));
     }
     found
 }
