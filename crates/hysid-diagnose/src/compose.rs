@@ -114,6 +114,9 @@ const PAIRS: (usize, usize) = (10, 4);
 /// Most rounds of drops and swaps: one may bring another best set, whose members have other rivals.
 const ROUNDS: usize = 4;
 
+/// Log evidence by which the second best set may trail and still have its members' rivals heard.
+const NEARLY: f64 = 6.0;
+
 /// Pairs of candidates of the simulation without effects, fitted together.
 pub fn superposed<'d>(
     setting: &Setting<'d>,
@@ -210,10 +213,43 @@ pub fn compose<'d>(
         if best_of_size(pool, n).is_some_and(|b| pool[b].log_evidence > evidence) {
             recast(setting, none, pool, n);
         }
-        if best_of(pool).is_none_or(|b| pool[b].key() == before) {
+        let stands = |pool: &[Hypothesis<'_>]| best_of(pool).is_none_or(|b| pool[b].key() == before);
+        if stands(pool) && !enough() {
+            beside_the_second(setting, none, pool, n, ask);
+        }
+        if stands(pool) {
             break;
         }
     }
+}
+
+/// Adds what comes of the second best set of so many effects, where it is nearly as likely as the best, by putting in the place of each member what
+/// is easily taken for it: where both members of the best set stand for something else, no single swap leads from it to what they stand for.
+fn beside_the_second<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    pool: &mut Vec<Hypothesis<'d>>,
+    effects: usize,
+    ask: &Ask<'_, 'd>,
+) {
+    let mut order: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].effects.len() == effects).collect();
+    order.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
+    let [best, second, ..] = order[..] else { return };
+    if pool[second].log_evidence < pool[best].log_evidence - NEARLY {
+        return;
+    }
+    let mut found = Vec::new();
+    for index in 0..effects {
+        if setting.budget.omits(Step::Composition) {
+            break;
+        }
+        let Some(rest) = without(setting, none, &pool[second], index) else { continue };
+        let candidates = (ask.around)(&rest);
+        let list = rivals_of(&pool[second].effects[index], &candidates);
+        found.extend(refit_all(setting, &rest, &list));
+        found.push(rest);
+    }
+    found.into_iter().for_each(|h| add(pool, h));
 }
 
 /// Adds the best set of so many effects with the law of each member in the form that has the most evidence beside the others: a member that

@@ -158,7 +158,7 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Opti
             let output =
                 slot.label.strip_prefix("output:").and_then(|c| simulation.outputs.iter().position(|o| o.column == c));
             if let Some(o) = output {
-                signals.measured = Some(data.stretches.iter().flat_map(|s| s.outputs[o].iter().copied()).collect());
+                signals.measure(Some(data.stretches.iter().flat_map(|s| s.outputs[o].iter().copied()).collect()));
             }
             Some(signals)
         })
@@ -190,7 +190,7 @@ pub fn screen(
             if !mechanism.fits(slot) || (mechanism.is_in(slot) && !added()) || !keep(mechanism, slot) {
                 continue;
             }
-            if let Some(signals) = &at[place] {
+            if let Some(signals) = at[place].as_ref().filter(|s| mechanism.is_written_from(s)) {
                 work.push((mechanism, &structure.slots[place], signals));
             }
         }

@@ -138,7 +138,7 @@ impl Need {
                 if !changes(s) {
                     return Some("the simulated output does not change its sign".to_owned());
                 }
-                let measured = signals.measured.as_deref()?;
+                let measured = signals.measured()?;
                 changes(measured).then(|| "the recorded output changes its sign".to_owned())
             }
         }

@@ -145,6 +145,11 @@ impl Mechanism {
         let missing: Vec<String> = self.needs.iter().filter_map(|need| need.lacking(signals)).collect();
         if missing.is_empty() { None } else { Some(missing.join("; ")) }
     }
+
+    /// Whether the law can be written at all: the step of a sensor that shows none cannot.
+    pub fn is_written_from(&self, signals: &Signals) -> bool {
+        !self.needs.contains(&Need::Steps) || signals.resolution().is_some()
+    }
 }
 
 /// Every mechanism, in the order of the families.

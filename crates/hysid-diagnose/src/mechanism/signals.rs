@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use hysid_plant::{BinaryOp, Expr, Function};
 
@@ -23,8 +24,8 @@ pub struct Signals {
     pub series: BTreeMap<String, Vec<f64>>,
     /// The value of each symbol of the slot that does not move (`k`, `c`, `m`, `p`).
     pub constants: BTreeMap<String, f64>,
-    /// The recorded output, at a sensor.
-    pub measured: Option<Vec<f64>>,
+    measured: Option<Vec<f64>>,
+    step: OnceLock<Option<f64>>,
     /// Lowest and highest excited frequency, in Hz.
     pub band_hz: (f64, f64),
     /// Frequencies of the largest peaks of the residual, if it is known, in Hz.
@@ -45,6 +46,7 @@ impl Signals {
             series,
             constants: BTreeMap::new(),
             measured: None,
+            step: OnceLock::new(),
             band_hz,
             peaks_hz: Vec::new(),
         }
@@ -179,9 +181,20 @@ impl Signals {
         (low, high)
     }
 
-    /// The step of the recorded output, where it shows one.
+    /// The recorded output, at a sensor.
+    pub fn measured(&self) -> Option<&[f64]> {
+        self.measured.as_deref()
+    }
+
+    /// With the recorded output of a sensor.
+    pub fn measure(&mut self, measured: Option<Vec<f64>>) {
+        (self.measured, self.step) = (measured, OnceLock::new());
+    }
+
+    /// The step of the recorded output, where it shows one. The search takes as long as a few simulations and is made once.
     pub fn resolution(&self) -> Option<f64> {
-        resolution(self.measured.as_ref()?, self.series("y").unwrap_or_default())
+        let found = || resolution(self.measured()?, self.series("y").unwrap_or_default());
+        *self.step.get_or_init(found)
     }
 }
 
@@ -264,10 +277,10 @@ mod tests {
     #[test]
     fn the_step_of_a_coarse_sensor_is_found() {
         let mut s = sine(2.0);
-        s.measured = s.series("u").map(|u| u.iter().map(|v| (v / 0.05).round() * 0.05).collect());
+        s.measure(s.series("u").map(|u| u.iter().map(|v| (v / 0.05).round() * 0.05).collect()));
         let found = s.resolution().unwrap();
         assert!((found - 0.05).abs() < 1e-9, "{found}");
-        s.measured = s.series("u").map(|u| u.iter().enumerate().map(|(n, v)| v + 1e-6 * n as f64).collect());
+        s.measure(s.series("u").map(|u| u.iter().enumerate().map(|(n, v)| v + 1e-6 * n as f64).collect()));
         assert_eq!(s.resolution(), None);
     }
 }

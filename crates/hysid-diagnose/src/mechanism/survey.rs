@@ -65,7 +65,7 @@ pub fn survey(
                 }
             }
         }
-        signals.measured = measured(slot, stretches);
+        signals.measure(measured(slot, stretches));
         found.push(signals);
     }
     Ok(found)

@@ -33,7 +33,7 @@ impl Bench {
         seen.peaks_hz = self.peaks_hz(&truth.outputs);
         if let Target::Output(column) = &slot.target {
             let at = self.simulation.outputs.iter().position(|o| o.column == *column);
-            seen.measured = at.and_then(|i| truth.outputs.get(i).cloned());
+            seen.measure(at.and_then(|i| truth.outputs.get(i).cloned()));
         }
         let written = mechanism.rewrite(&self.simulation, slot, &seen, Purpose::Refit).ok()?;
         let compiled = Compiled::new(&written.simulation).ok()?;
