@@ -204,7 +204,9 @@ pub fn compose<'d>(
                 break;
             }
             let Some(rest) = without(setting, none, &pool[best], index) else { continue };
-            found.extend(extended(setting, &rest, &around(&rest), options, Some(&pool[best].effects[index])));
+            let candidates = around(&rest);
+            found.extend(swapped(setting, none, &pool[best], index, &candidates));
+            found.extend(extended(setting, &rest, &candidates, options, Some(&pool[best].effects[index])));
             found.push(rest);
         }
         for h in found {
@@ -244,12 +246,34 @@ fn beside_the_second<'d>(
             break;
         }
         let Some(rest) = without(setting, none, &pool[second], index) else { continue };
-        let candidates = (ask.around)(&rest);
-        let list = rivals_of(&pool[second].effects[index], &candidates);
-        found.extend(refit_all(setting, &rest, &list));
+        found.extend(swapped(setting, none, &pool[second], index, &(ask.around)(&rest)));
         found.push(rest);
     }
     found.into_iter().for_each(|h| add(pool, h));
+}
+
+/// A set with what is easily taken for one of its members in that member's place, the others as they are: fitted alone first, they may come to rest
+/// where nothing leads back from.
+fn swapped<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    set: &Hypothesis<'d>,
+    index: usize,
+    candidates: &[Candidate],
+) -> Vec<Hypothesis<'d>> {
+    let values = set.base.values();
+    let sketched = rivals_of(&set.effects[index], candidates).into_par_iter().filter_map(|rival| {
+        if setting.budget.omits(Step::Composition) {
+            return None;
+        }
+        let amplitudes = rival.points.first().map_or(&[][..], |p| &p.amplitudes);
+        let mut parts: Vec<Part> = set.effects.iter().map(|e| Part::of_effect(e, &values)).collect();
+        parts[index] = Part::of_candidate(rival, 0, amplitudes);
+        let h = assemble(setting, none, &values, &parts, &set.base.whitener, 5)?;
+        let near = h.log_evidence > set.log_evidence - HOPELESS;
+        Some(if near { complete(setting, h) } else { h })
+    });
+    sketched.collect()
 }
 
 /// Adds the best set of so many effects with the law of each member in the form that has the most evidence beside the others: a member that

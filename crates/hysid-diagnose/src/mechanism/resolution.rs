@@ -13,9 +13,11 @@ use std::f64::consts::TAU;
 /// Steps that the signal must cover at least: a smooth distribution has a characteristic function of its own below that.
 const FEWEST: f64 = 6.0;
 /// Steps that it may cover at most: finer ones do not matter beside any noise.
-const MOST: f64 = 400.0;
+const MOST: f64 = 800.0;
 /// Values that a search needs.
 const FEWEST_VALUES: usize = 200;
+/// Most values that are searched, evenly taken: more tell nothing that these do not.
+const MOST_VALUES: usize = 8000;
 /// Points of the search for each step that the signal may cover.
 const DENSITY: f64 = 4.0;
 /// Odds against so large a sum by chance, at any of the steps that are searched.
@@ -29,6 +31,9 @@ const PEAKS: usize = 12;
 
 /// The step of these values, of which a simulation without steps says what they would be; `None` where they show none.
 pub fn resolution(values: &[f64], simulated: &[f64]) -> Option<f64> {
+    let every = values.len().div_ceil(MOST_VALUES).max(1);
+    let some = |series: &[f64]| series.iter().copied().step_by(every).collect::<Vec<f64>>();
+    let (values, simulated) = (&some(values), &some(simulated));
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     // A converter behind the noise has steps of its own, which are finer.
