@@ -37,7 +37,8 @@ pub fn resolution(values: &[f64], simulated: &[f64]) -> Option<f64> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     // A converter behind the noise has steps of its own, which are finer.
-    match (repeated(&sorted), sawtooth(values, simulated).or_else(|| blurred(&sorted))) {
+    let fine = repeated(&sorted);
+    match (fine, sawtooth(values, simulated, fine).or_else(|| blurred(&sorted))) {
         (Some(fine), Some(coarse)) if coarse < 3.0 * fine => Some(fine),
         (fine, coarse) => coarse.or(fine),
     }
@@ -72,8 +73,9 @@ fn blurred(values: &[f64]) -> Option<f64> {
     (prominent >= ABOVE).then(|| 1.0 / search.refined(best))
 }
 
-/// The step by whose rounding a simulated signal comes closer to the values, by so much as chance does at none of the steps that are searched.
-fn sawtooth(values: &[f64], simulated: &[f64]) -> Option<f64> {
+/// The step by whose rounding a simulated signal comes closer to the values, by so much as chance does at none of the steps that are searched, and by
+/// more than with a step that is `known`, some multiple of which may look like one.
+fn sawtooth(values: &[f64], simulated: &[f64], known: Option<f64>) -> Option<f64> {
     let pairs = values.iter().zip(simulated).filter(|(v, x)| v.is_finite() && x.is_finite());
     let (at, errors): (Vec<f64>, Vec<f64>) = pairs.map(|(v, x)| (*x, v - x)).unzip();
     let search = Search::new(&at, &errors)?;
@@ -89,6 +91,7 @@ fn sawtooth(values: &[f64], simulated: &[f64]) -> Option<f64> {
     // Log likelihood: both errors as white noise of unknown size.
     let gain = |q: f64| 0.5 * at.len() as f64 * (whole / power(Some(q))).ln();
     let steps = peaks.into_iter().take(PEAKS).map(|i| 1.0 / search.refined(i)).map(|q| (q, gain(q)));
+    let steps = steps.chain(known.map(|q| (q, gain(q))));
     let (q, gain) = steps.max_by(|a, b| a.1.total_cmp(&b.1))?;
     (gain > chance(sizes.len())).then_some(q)
 }
@@ -221,6 +224,15 @@ mod tests {
         found(0.1, resolution(&values, &simulated), "below the noise");
     }
 
+    #[test]
+    fn steps_finer_than_any_that_is_searched_are_not_taken_for_a_multiple() {
+        let x = smooth(9000);
+        let q = RANGE / 1500.0;
+        let values: Vec<f64> = x.iter().map(|v| q * (v / q).round()).collect();
+        let found = resolution(&values, &x).unwrap();
+        assert!((found / q - 1.0).abs() < 1e-6, "{found} {q}");
+    }
+
     /// A command that stays at a few levels: its values cluster, and not in steps.
     #[test]
     fn levels_are_no_steps() {
@@ -229,7 +241,7 @@ mod tests {
         let at: Vec<f64> = (0..1200).map(|i| levels[i / 100]).collect();
         let recorded: Vec<f64> =
             at.iter().map(|v| v + 0.01 * Distribution::<f64>::sample(&StandardNormal, &mut rng)).collect();
-        assert_eq!(sawtooth(&recorded, &at), None);
+        assert_eq!(sawtooth(&recorded, &at, None), None);
     }
 
     #[test]
