@@ -155,7 +155,7 @@ fn a_hum_is_found_although_a_noise_model_would_swallow_it() {
     let d = run(BASELINE, &[with_hum("est.csv", 1)], &[with_hum("val.csv", 2)]).unwrap();
     assert!(d.file.mismatch.p_value.unwrap() < 0.01, "{}", d.file.summary);
     assert_eq!(d.file.effects[0].family, "external_disturbance", "{}", d.file.summary);
-    assert!(d.file.fit[0].ratio.unwrap() < 0.1, "{:?}", d.file.fit);
+    assert!(d.file.fit[0].ratio.unwrap() < 0.5, "{:?}", d.file.fit);
 }
 
 #[test]
