@@ -117,16 +117,16 @@ mod tests {
         Drive::new(0.0, 0.01, 600, vec![u]).unwrap()
     }
 
-    /// What nothing loses is the baseline of `loss`.
+    /// Of writing a set, where the simulation as it is has a damping of 0.5.
     fn loss(own: f64, set: &Simulation, rivals: &[(f64, Simulation)]) -> Option<f64> {
         relative_loss(&drive(0.5, ""), (own, set), rivals, &pushed(), 4)
     }
 
     #[test]
-    fn nothing_is_lost_where_all_say_the_same_and_as_much_as_by_nothing_where_the_truth_is_as_far() {
+    fn nothing_is_lost_where_all_say_the_same_and_more_than_by_nothing_on_the_wrong_side() {
         let same = [(0.4, drive(0.6, ""))];
         assert!(loss(0.6, &drive(0.6, ""), &same).unwrap() < 1e-20);
-        // A rival for certain, which is the simulation as it is seen from the set: the squares are one to nothing.
+        // The truth for certain is the rival: on its side of the simulation as it is a set is better than nothing, on the other it is worse.
         assert!(loss(0.0, &drive(0.6, ""), &[(1.0, drive(0.7, ""))]).unwrap() < 1.0);
         assert!(loss(0.0, &drive(0.4, ""), &[(1.0, drive(0.6, ""))]).unwrap() > 1.0);
         // Neither differs from the simulation as it is.
