@@ -36,7 +36,8 @@ fn evaluate(document: &Simulation, expressions: &[Expr], theta: &[Vec<f64>]) -> 
     )
 }
 
-/// The reported parameters of one effect of a fitted simulation, with 95 % intervals by the delta method.
+/// The reported parameters of one effect of a fitted simulation, with 95 % intervals by the delta method; none where no unknown of the fit moves a
+/// value.
 pub fn reported(base: &Base<'_>, effect: &Effect) -> Vec<ParameterRecord> {
     let document = base.document();
     let expressions: Vec<Expr> = effect.written.report.iter().map(|r| r.value.clone()).collect();
@@ -75,12 +76,15 @@ pub fn reported(base: &Base<'_>, effect: &Effect) -> Vec<ParameterRecord> {
                     variance += gradient[a] * gradient[b] * covariance[pa + k * pb];
                 }
             }
+            // What no unknown moves was read from the recording or chosen from a grid: nothing tells how well it is known.
+            let fitted = gradient.iter().any(|g| *g != 0.0);
             let half = 1.96 * variance.max(0.0).sqrt();
+            let end = |x: f64| finite(x).filter(|_| fitted);
             ParameterRecord {
                 name: r.name.clone(),
                 value,
-                low: finite(value - half),
-                high: finite(value + half),
+                low: end(value - half),
+                high: end(value + half),
                 unit: r.unit.as_ref().map(ToString::to_string).unwrap_or_default(),
             }
         })

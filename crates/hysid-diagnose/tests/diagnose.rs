@@ -158,6 +158,24 @@ fn a_hum_is_found_although_a_noise_model_would_swallow_it() {
     assert!(d.file.fit[0].ratio.unwrap() < 0.5, "{:?}", d.file.fit);
 }
 
+/// The step is read from the recording and no fitted number: it has no interval, rather than one of no width.
+#[test]
+fn the_step_of_a_coarse_sensor_is_told_without_an_interval() {
+    let coarse = |name: &str, seed: u64| {
+        let fine = recording(name, seed, 900, |_, _| 0.0);
+        let mut channels = fine.channels().to_vec();
+        channels[1].samples.iter_mut().for_each(|y| *y = STEP * (*y / STEP).round());
+        Recording::new(name, fine.clock(), channels).unwrap()
+    };
+    let d = run(BASELINE, &[coarse("est.csv", 1)], &[coarse("val.csv", 2)]).unwrap();
+    let effect = d.file.effects.iter().find(|e| e.mechanism == "quantisation").expect(&d.file.summary);
+    let q = &effect.parameters[0];
+    assert!((q.value / STEP - 1.0).abs() < 1e-3 && q.low.is_none() && q.high.is_none(), "{q:?}");
+}
+
+/// Metres; the motion of these recordings is some tenths of a metre.
+const STEP: f64 = 0.05;
+
 #[test]
 fn a_law_that_the_catalogue_does_not_have_is_not_given_a_firm_name() {
     // Damping that rises and falls with the position and never drives.
