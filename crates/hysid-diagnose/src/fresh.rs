@@ -2,8 +2,8 @@
 //!
 //! A set of effects that was fitted to a small residual may do anything where the recording has not been: a spring that pushes, on a drive that
 //! nothing holds, is small until the drive goes there. Sets that are as likely tell how much hangs on the choice: should one of them be the
-//! truth, writing the likeliest set brings its distance from the truth, and writing nothing brings the baseline's. The set with the smaller
-//! expected loss is written. Inputs are the recorded ones mirrored (each about the middle of its range) and reversed in time: they have
+//! truth, writing the likeliest set brings its distance from the truth, and writing nothing brings the baseline's. It is written where its
+//! expected loss is well below that of writing nothing. Inputs are the recorded ones mirrored (each about the middle of its range) and reversed in time: they have
 //! the same levels and the same band, and lead elsewhere.
 //!
 //! Reference: J. O. Berger, Statistical Decision Theory and Bayesian Analysis, 2nd ed., Springer (1985), ch. 4.

@@ -67,8 +67,10 @@ fn blurred(values: &[f64]) -> Option<f64> {
     let search = Search::new(values, &weights)?;
     let sizes = search.sizes();
     let best = (0..sizes.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]))?;
-    let visible = VISIBLE * (values.len() as f64).sqrt();
-    (sizes[best] > visible.max(ABOVE * median(&sizes))).then(|| 1.0 / search.refined(best))
+    let mut ordered = sizes.clone();
+    ordered.sort_by(f64::total_cmp);
+    let (visible, outstanding) = (VISIBLE * (values.len() as f64).sqrt(), ABOVE * ordered[ordered.len() / 2]);
+    (sizes[best] > visible.max(outstanding)).then(|| 1.0 / search.refined(best))
 }
 
 /// The step by whose rounding a simulated signal comes closer to the values, by so much as chance does at none of the steps that are searched, and by
@@ -167,12 +169,6 @@ impl<'a> Search<'a> {
         }
         at
     }
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
