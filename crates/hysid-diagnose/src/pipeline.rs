@@ -163,10 +163,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(&plain, options, hooks);
     let murky = none.base.gross() || none.base.far();
-    let heard = murky || ((none.base.coloured() || none.base.driven()) && !budget.omits(Step::OtherNoise));
+    let mut significant = test.p_value < options.alpha;
+    // A slight colour matters where nothing is seen under it.
+    let colour = none.base.coloured() || none.base.driven() || (!significant && none.base.whitener.coefficients() > 0);
+    let heard = murky || (colour && !budget.omits(Step::OtherNoise));
     let plain_start = if heard { plainly.start(&none) } else { None };
     let (mut gross, under_white) = if murky { (plain_start, None) } else { (None, plain_start) };
-    let mut significant = test.p_value < options.alpha;
     let mut pool = Vec::new();
     // A coloured noise model takes part of a mismatch for noise: what plain squares would find is heard too.
     if let Some((start, found)) = &under_white {

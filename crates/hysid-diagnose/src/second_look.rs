@@ -37,6 +37,9 @@ const MOMENTS: f64 = 25.0;
 /// process noise on a drive above all.
 pub const SLOW: f64 = 8.0;
 
+/// Share of the level that the rehearsal has: it is the third test that a recording must pass in which nothing is missing.
+const REHEARSED: f64 = 1.0 / 3.0;
+
 /// Lines of a recording's spectrum among which the residual itself pointed to one, for each of an effect's shapes that is such a line.
 pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
     let lines = |shape: &Shape| if shape.places == Places::Lines { (0.5 * data.rows() as f64).max(1.0) } else { 1.0 };
@@ -76,12 +79,16 @@ impl<'d> Search<'_, 'd> {
                 })
                 .product::<f64>()
         };
+        // A set that leaves white noise has no colour left to choose: it need not allow for those that noise may have.
+        let spared_by = |h: &Hypothesis<'_>| {
+            let noise = if h.base.whitener.coefficients() > 0 { &h.base.whitener } else { &start.base.whitener };
+            spared(self.setting.data, noise, &start.base.whitener)
+        };
         let evidence = |h: &Hypothesis<'_>| {
             let slow = h.effects.iter().all(|e| e.mechanism.family.is_slow_noise());
-            h.log_evidence + spared(self.setting.data, &h.base.whitener, &start.base.whitener)
-                - if slow { SLOW } else { 0.0 }
+            h.log_evidence + spared_by(h) - if slow { SLOW } else { 0.0 }
         };
-        let none = start.log_evidence + spared(self.setting.data, &start.base.whitener, &start.base.whitener);
+        let none = start.log_evidence + spared_by(start);
         let bound = |h: &Hypothesis<'_>| ODDS_AGAINST * sets(h) * (none - evidence(h)).exp();
         let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
         let p = bound(best).min(1.0);
@@ -97,8 +104,8 @@ impl<'d> Search<'_, 'd> {
         matches!((squares(start), squares(set)), (Some(before), Some(after)) if after < before)
     }
 
-    /// The probability, below the level of the tests, that the likeliest effects gain so much where nothing is missing, by simulation. Asked only
-    /// where the noise has a colour and is known below the lowest line (of 1/f noise no recording tells how it goes on there, and simulations of
+    /// The probability, below [`REHEARSED`] of the level of the tests, that the likeliest effects gain so much where nothing is missing, by simulation.
+    /// Asked only where the noise is known below the lowest line (of 1/f noise no recording tells how it goes on there, and simulations of
     /// it would promise too much), and where a set of those that were `fitted` predicts blocks better.
     pub fn by_rehearsal(
         &self,
@@ -108,8 +115,9 @@ impl<'d> Search<'_, 'd> {
         plain: Option<&(Hypothesis<'d>, Vec<Candidate>)>,
     ) -> Option<f64> {
         let Options { alpha, seed } = self.options;
+        let level = REHEARSED * alpha;
         let noise = &none.base.whitener;
-        if noise.coefficients() == 0 || !noise.models.iter().all(NoiseModel::is_known_below) {
+        if !noise.models.iter().all(NoiseModel::is_known_below) {
             return None;
         }
         let quick = |h: &&Hypothesis<'_>| h.effects.iter().any(|e| !e.mechanism.family.is_slow_noise());
@@ -119,7 +127,7 @@ impl<'d> Search<'_, 'd> {
             return None;
         }
         (self.hooks.progress)("rehearsing on simulated recordings in which nothing is missing");
-        by_rehearsal(self.setting, none, candidates, plain, alpha, seed).filter(|p| *p < alpha)
+        by_rehearsal(self.setting, none, candidates, plain, level, seed).filter(|p| *p < level)
     }
 
     /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.

@@ -97,10 +97,15 @@ impl NoiseModel {
     /// A short autoregression with a corner may say in few coefficients what a long one says in many, so both are tried.
     pub fn fit(stretches: &[&[f64]], max_order: usize, paths: &[ForcePath]) -> Self {
         let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
-        let ar = fit_ar(stretches, max_order);
         if max_order == 0 || longest < SHORTEST {
-            return Self::of(ar, None);
+            return Self::of(fit_ar(stretches, max_order), None);
         }
+        // The mean is an effect's, or what lies below the lowest line: no autoregression may follow it, which would hide any offset.
+        let total: usize = stretches.iter().map(|s| s.len()).sum();
+        let mean = stretches.iter().flat_map(|s| s.iter()).sum::<f64>() / total as f64;
+        let centred: Vec<Vec<f64>> = stretches.iter().map(|s| s.iter().map(|e| e - mean).collect()).collect();
+        let stretches: &[&[f64]] = &centred.iter().map(Vec::as_slice).collect::<Vec<_>>();
+        let ar = fit_ar(stretches, max_order);
         let bent = corners(longest);
         let mut seen = vec![ar.order()];
         let mut best = ar.shaped(stretches, &[even_knots(longest), bent.clone()].concat());
@@ -116,7 +121,6 @@ impl NoiseModel {
                 }
             }
         }
-        let total: usize = stretches.iter().map(|s| s.len()).sum();
         let price = 0.5 * (total as f64).ln();
         // What looks white to an autoregression may hide a little of a force; most often it does not, and two looks tell.
         let white = best.coefficients() == 0;
@@ -139,8 +143,11 @@ impl NoiseModel {
         // Whatever passes through the plant is known by its way down to the plant's corner, and 1/f noise is easily taken for it.
         let Kind::Shaped(ar, shape) = &self.kind else { return 1.0 };
         let rise = rise(|k| ar.log_power(k as f64 / n as f64) + shape.as_ref().map_or(0.0, |s| s.log_power(k, n)));
-        // Where a shape is needed for the lowest lines it is 1/f noise at least, whatever the few lines say of its slope.
-        if shape.is_some() && rise > RISING { rise.max(1.0) } else { rise }
+        // Where a shape is needed for the lowest lines it is 1/f noise at least, whatever the few lines say of its slope. An autoregression is
+        // flat below its reach, whatever the noise does there.
+        let slow =
+            if shape.is_some() { rise > RISING } else { ar.log_power(1.0 / n as f64) - ar.log_power(0.25) > LN_2 };
+        if slow { rise.max(1.0) } else { rise }
     }
 
     /// Log likelihood of these stretches less half of `ln n` for each coefficient.
@@ -285,6 +292,28 @@ mod tests {
             e[n] += 0.9 * e[n - 1];
         }
         assert!(matches!(NoiseModel::fit(&[&e], 16, &[]).kind, Kind::Shaped(_, None)));
+    }
+
+    #[test]
+    fn an_offset_is_no_colour_of_the_noise() {
+        let (n, offset) = (4000, 3.0);
+        let mean = |w: &[f64]| w.iter().sum::<f64>() / w.len() as f64;
+        for coefficient in [0.0, 0.9] {
+            let mut e = white(n, 11);
+            (1..n).for_each(|i| e[i] += coefficient * e[i - 1]);
+            let raised: Vec<f64> = e.iter().map(|e| e + offset).collect();
+            let m = NoiseModel::fit(&[&raised], 16, &[]);
+            let without = NoiseModel::fit(&[&e], 16, &[]);
+            assert_eq!(m.coefficients(), without.coefficients(), "coefficient {coefficient}");
+            assert!((m.innovation() / without.innovation() - 1.0).abs() < 1e-9);
+            assert_eq!(m.coefficients() == 0, coefficient == 0.0);
+            let mut w = vec![0.0; n];
+            m.whiten(&raised, &mut w);
+            // Standard errors by which the mean stands out: its own size in white noise; under a colour the mean may hold more.
+            let expected = offset * (1.0 - coefficient) * (n as f64).sqrt();
+            let found = mean(&w) * (n as f64).sqrt();
+            assert!(found > 0.25 * expected && found < 1.1 * expected, "{found} {expected}");
+        }
     }
 
     #[test]
