@@ -130,6 +130,11 @@ pub(crate) fn first_clash(simulation: &Simulation) -> Option<(String, String)> {
 }
 
 impl Simulation {
+    /// Whether the declared units agree with each other.
+    pub fn units_agree(&self) -> bool {
+        first_clash(self).is_none()
+    }
+
     /// The unit of an expression over this simulation's symbols, where the declared units settle it; inputs count with the
     /// unit that their column's name ends in.
     pub fn unit_of_expr(&self, expr: &Expr) -> Option<Unit> {

@@ -227,19 +227,30 @@ impl Display for Unit {
 }
 
 impl Unit {
-    /// The unit that a column's name ends in: `force_N` gives `N`, `v_mm_s` gives `mm/s`; nothing where the end is not known.
+    /// The unit that a column's name ends in: `force_N` gives `N`, `v_mm_s` gives `mm/s`, `inflow_m3_s` gives `m^3/s`; nothing where the end is
+    /// not known.
     pub fn of_column(column: &str) -> Option<Self> {
         let parts: Vec<&str> = column.split('_').skip(1).collect();
         let (&last, before) = parts.split_last()?;
-        // `_s`, `_s2` after a unit divide by it; alone they are seconds.
+        // A time after a unit divides by it; alone it is a time.
         let per = match last {
-            "s" => Some(1),
-            "s2" => Some(2),
+            "s" | "min" | "h" => Some((last, 1)),
+            "s2" => Some(("s", 2)),
             _ => None,
         };
-        if let (Some(power), Some(numerator)) = (per, before.last().filter(|n| exponents(n).is_some())) {
-            return Some(Self { factors: vec![((*numerator).to_owned(), 1), ("s".to_owned(), -power)] });
+        if let (Some((time, power)), Some((name, exponent))) = (per, before.last().and_then(|n| powered(n))) {
+            return Some(Self { factors: vec![(name.to_owned(), exponent), (time.to_owned(), -power)] });
         }
+        // `x_m2` is more likely the place of a second mass than an area.
         exponents(last).map(|_| Self { factors: vec![(last.to_owned(), 1)] })
     }
+}
+
+/// A known name with the power that may follow it: `m3` is a cubic metre.
+fn powered(text: &str) -> Option<(&str, i32)> {
+    let (name, exponent) = match text.char_indices().next_back()? {
+        (at, digit @ ('2' | '3')) => (&text[..at], i32::from(digit == '3') + 2),
+        _ => (text, 1),
+    };
+    exponents(name).map(|_| (name, exponent))
 }

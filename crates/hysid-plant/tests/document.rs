@@ -87,6 +87,12 @@ fn units_multiply_and_compare() {
     assert!(!unit("N").same_dimension(&unit("N m")));
     assert_eq!(Unit::of_column("v_cm_s").map(|u| u.to_string()).as_deref(), Some("cm/s"));
     assert_eq!(Unit::of_column("force_N").map(|u| u.to_string()).as_deref(), Some("N"));
+    assert_eq!(Unit::of_column("inflow_m3_s").map(|u| u.to_string()).as_deref(), Some("m^3/s"));
+    assert_eq!(Unit::of_column("flow_L_min").map(|u| u.to_string()).as_deref(), Some("L/min"));
+    assert_eq!(Unit::of_column("a_m_s2").map(|u| u.to_string()).as_deref(), Some("m/s^2"));
+    assert_eq!(Unit::of_column("t_s").map(|u| u.to_string()).as_deref(), Some("s"));
+    assert_eq!(Unit::of_column("rest_min").map(|u| u.to_string()).as_deref(), Some("min"));
+    assert_eq!(Unit::of_column("x_m2"), None);
     assert_eq!(Unit::of_column("valve"), None);
     for bad in ["N/m/s", "N^x", "3 m", "/", "m^99"] {
         assert!(Unit::parse(bad).is_err(), "{bad}");

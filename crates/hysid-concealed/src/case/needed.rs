@@ -52,6 +52,8 @@ fn special_case(e: &Effect) -> Option<Effect> {
         Law::AsymmetricFriction if e.p[0] > 0.0 && e.p[1] > 0.0 => (Law::Coulomb, vec![0.5 * (e.p[0] + e.p[1])]),
         // Made weak, the time constant is a fraction of a sample and the damping of the back-EMF is the drive's own.
         Law::BackEmf => (Law::ActuatorLag, vec![e.p[1]]),
+        // With beta alone and an exponent of one.
+        Law::BoucWen => (Law::Dahl, vec![e.p[0], e.p[1]]),
         Law::AsymmetricBoucWen | Law::Pinching | Law::Degradation => (Law::BoucWen, e.p[..4].to_vec()),
         _ => return None,
     };

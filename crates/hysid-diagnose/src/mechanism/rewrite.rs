@@ -211,6 +211,13 @@ impl Mechanism {
     }
 }
 
+/// Takes the units from what a law added to a simulation. Where a column's name ends in what is not its unit (`valve_A` for the first of two
+/// valves), units made of it clash with those that the file declares, and no law would be compared there.
+fn without_units(written: &mut Simulation, before: &Simulation) {
+    written.parameters.iter_mut().filter(|p| before.parameter(&p.name).is_none()).for_each(|p| p.unit = None);
+    written.states.iter_mut().filter(|s| before.state(&s.name).is_none()).for_each(|s| s.unit = None);
+}
+
 fn write_law(
     simulation: &Simulation,
     slot: &Slot,
@@ -295,6 +302,9 @@ fn write_law(
         }
     }
     enter(&mut written, slot, &law.change, &writer)?;
+    if !written.units_agree() {
+        without_units(&mut written, simulation);
+    }
     let mut report = Vec::new();
     for parameter in law.parameters.iter().filter(|p| p.reported) {
         let value = writer.text(&parameter.name)?;
