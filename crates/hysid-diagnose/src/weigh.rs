@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::base::Base;
 use crate::budget::Step;
 use crate::compose::best_of;
+use crate::evidence::norm2;
 use crate::experiment::SETTLED;
 use crate::hypothesis::{Effect, Hypothesis, Setting, block_score};
 use crate::verdict::{Claim, FIRM, Hypothesis as Weighed};
@@ -151,6 +152,40 @@ fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
     kinds(a) == kinds(b)
 }
 
+/// Squared difference of two predictions, in units of the noise, below which no recording of this length tells them apart.
+const SAME: f64 = 1.0;
+/// Log evidence by which a set may trail and its other wordings still matter.
+const NEAR: f64 = 12.0;
+
+/// How many sets say in other words what each one says: as many effects of the same families, and the same prediction. An offset of the input and
+/// one of the sensor of a linear plant are one statement; told twice, they would count twice against another family.
+fn wordings(pool: &[Hypothesis<'_>], winner: usize) -> Vec<usize> {
+    let best = &pool[winner];
+    let families: Vec<Vec<&str>> = pool
+        .iter()
+        .map(|h| {
+            let mut of: Vec<&str> = h.effects.iter().map(|e| e.mechanism.family.name()).collect();
+            of.sort_unstable();
+            of
+        })
+        .collect();
+    let layout = &best.base.model.data().layout;
+    let same = |a: &Hypothesis<'_>, b: &Hypothesis<'_>| {
+        let difference: Vec<f64> = a.base.fit.residual.iter().zip(&b.base.fit.residual).map(|(a, b)| a - b).collect();
+        norm2(&best.base.whitener.apply(layout, &difference)) < SAME
+    };
+    (0..pool.len())
+        .map(|i| {
+            let near = |j: usize| (pool[i].log_evidence - pool[j].log_evidence).abs() < SAME;
+            if pool[i].log_evidence < best.log_evidence - NEAR {
+                return 1;
+            }
+            let others = (0..pool.len()).filter(|&j| j != i && families[j] == families[i] && near(j));
+            1 + others.filter(|&j| same(&pool[i], &pool[j])).count()
+        })
+        .collect()
+}
+
 /// How much of the price of its further parameters a set pays too much that contains another as a special case.
 ///
 /// Half of `ln n` is right for a parameter that the recording settles as well as one of its samples times the number of samples. A power that
@@ -197,6 +232,7 @@ pub fn log_weights(
 ) -> Vec<f64> {
     let best_block = blocks[winner].as_ref().map(|b| b.0);
     let best = &pool[winner];
+    let wordings = wordings(pool, winner);
     pool.iter()
         .enumerate()
         .map(|(i, h)| {
@@ -220,7 +256,7 @@ pub fn log_weights(
             if contains && h.base.log_likelihood - best.base.log_likelihood < NESTED_GAIN {
                 log += (NESTED_WEIGHT - weight).max(0.0) * behind;
             }
-            log
+            log - (wordings[i] as f64).ln()
         })
         .collect()
 }
