@@ -16,8 +16,8 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
             // A mass on a spring that hangs on the moving part: the force that accelerates it is missing there.
             return Law::force("m_a*((2*pi*f_a)^2*(x - x_a) + 4*pi*f_a*zeta_a*(v - v_a))")
                 .amplitude("m_a", slot.mass_measure(), 0.0, 5.0)
-                .shape("f_a", "1/t", Grid::Band(17))
-                .shape("zeta_a", "1", Grid::Values(vec![0.02]))
+                .shape("f_a", "1/t", Grid::Band(25))
+                .shape("zeta_a", "1", Grid::Values(vec![0.02, 0.15]))
                 .within(0.001, 0.7)
                 .state("x_a", "x", "v_a")
                 .starting_like("x")
@@ -34,7 +34,7 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
         for i in 1..=slot.inputs() {
             law = law.amplitude(format!("b_{i}"), format!("y/u_{i}"), -3.0, 3.0);
         }
-        law.shape("f_a", "1/t", Grid::Band(17)).shape("zeta_a", "1", Grid::Values(vec![0.02])).within(0.001, 0.7)
+        law.shape("f_a", "1/t", Grid::Band(25)).shape("zeta_a", "1", Grid::Values(vec![0.02, 0.15])).within(0.001, 0.7)
     },
     contains: &[],
     confusable: &["delay", "viscoelastic"],
