@@ -23,7 +23,6 @@ use crate::records::*;
 use crate::reliability::recalibrate;
 use crate::screen::screen;
 use crate::search::{Search, calibrate, leaves_more, words};
-use crate::second_look::{ODDS_AGAINST, unlikely};
 use crate::text::number;
 use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, verdict};
 use crate::weigh::*;
@@ -186,9 +185,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
                     .or_else(|| search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref()))
             }
         };
-        let seen =
-            seen.or_else(|| search.open(&none).map(|o| unlikely(&o, ODDS_AGAINST)).filter(|p| *p < options.alpha));
-        if let Some(p) = seen {
+        if let Some(p) = seen.or_else(|| search.by_terms(&none)) {
             file.notes.push(format!(
                 "surrogates of the residual do not tell the mismatch from noise (p = {:.3}); effects that were fitted to it do (p = {p:.1e})",
                 test.p_value

@@ -12,7 +12,6 @@ use crate::fitting::refit_all;
 use crate::hypothesis::{Effect, Hypothesis, block_score};
 use crate::mechanism::{Places, Rewritten, Shape};
 use crate::openset::OpenSet;
-use crate::pipeline::Options;
 use crate::rehearsal::by_rehearsal;
 use crate::screen::Candidate;
 use crate::search::Search;
@@ -37,8 +36,9 @@ const MOMENTS: f64 = 25.0;
 /// process noise on a drive above all.
 pub const SLOW: f64 = 8.0;
 
-/// Share of the level that the rehearsal has: it is the third test that a recording must pass in which nothing is missing.
-const REHEARSED: f64 = 1.0 / 3.0;
+/// Share of the level that each test of a second look has: sets, rehearsals and generic terms are three tests that a recording must pass in which
+/// nothing is missing, beside the surrogates.
+const OF_THREE: f64 = 1.0 / 3.0;
 
 /// Lines of a recording's spectrum among which the residual itself pointed to one, for each of an effect's shapes that is such a line.
 pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
@@ -92,10 +92,17 @@ impl<'d> Search<'_, 'd> {
         let bound = |h: &Hypothesis<'_>| ODDS_AGAINST * sets(h) * (none - evidence(h)).exp();
         let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
         let p = bound(best).min(1.0);
-        if p >= self.options.alpha {
-            return None;
-        }
-        self.predicts_blocks(start, best).then_some(p)
+        (p < self.level() && self.predicts_blocks(start, best)).then_some(p)
+    }
+
+    /// The level of each test of the second look.
+    fn level(&self) -> f64 {
+        OF_THREE * self.options.alpha
+    }
+
+    /// A bound for the probability that generic terms gain so much where nothing is missing, below the level.
+    pub fn by_terms(&self, start: &Hypothesis<'d>) -> Option<f64> {
+        self.open(start).map(|o| unlikely(&o, ODDS_AGAINST)).filter(|p| *p < self.level())
     }
 
     /// Whether a set predicts blocks that it was not fitted to better than the simulation as it is.
@@ -104,7 +111,7 @@ impl<'d> Search<'_, 'd> {
         matches!((squares(start), squares(set)), (Some(before), Some(after)) if after < before)
     }
 
-    /// The probability, below [`REHEARSED`] of the level of the tests, that the likeliest effects gain so much where nothing is missing, by simulation.
+    /// The probability, below the level, that the likeliest effects gain so much where nothing is missing, by simulation.
     /// Asked only where the noise is known below the lowest line (of 1/f noise no recording tells how it goes on there, and simulations of
     /// it would promise too much), and where a set of those that were `fitted` predicts blocks better.
     pub fn by_rehearsal(
@@ -114,8 +121,7 @@ impl<'d> Search<'_, 'd> {
         candidates: &[Candidate],
         plain: Option<&(Hypothesis<'d>, Vec<Candidate>)>,
     ) -> Option<f64> {
-        let Options { alpha, seed } = self.options;
-        let level = REHEARSED * alpha;
+        let level = self.level();
         let noise = &none.base.whitener;
         if !noise.models.iter().all(NoiseModel::is_known_below) {
             return None;
@@ -127,7 +133,7 @@ impl<'d> Search<'_, 'd> {
             return None;
         }
         (self.hooks.progress)("rehearsing on simulated recordings in which nothing is missing");
-        by_rehearsal(self.setting, none, candidates, plain, level, seed).filter(|p| *p < level)
+        by_rehearsal(self.setting, none, candidates, plain, level, self.options.seed).filter(|p| *p < level)
     }
 
     /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.

@@ -86,8 +86,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let count = args.cases.unwrap_or(if args.quick { 100 } else { 240 });
     ensure!(count > 0, "--cases must be at least 1");
     let range = args.first..args.first + count;
+    let longest = args.longest.unwrap_or(if args.quick { 2000 } else { usize::MAX });
     if let Some(root) = &args.write {
-        let cases = bank::cases(stream, args.seed, range);
+        let mut cases = bank::cases(stream, args.seed, range);
+        cases.retain(|case| case.label.samples <= longest);
         bank::write(root, &cases)?;
         println!("{} cases written below {}", cases.len(), root.display());
         return Ok(());
@@ -103,7 +105,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         stream,
         seed: args.seed,
         range,
-        longest: args.longest.unwrap_or(if args.quick { 2000 } else { usize::MAX }),
+        longest,
         deadline: args.minutes.map(|m| start + Duration::from_secs(60 * m)),
     };
     let done =

@@ -7,7 +7,7 @@ use anyhow::Context;
 use hysid_report::figure::{Mark, Plot, Tone};
 use hysid_report::page::{Align, Page, Table};
 
-use super::score::{CELLS, Line, Row, Score, Standing};
+use super::score::{CELLS, Line, Row, Score, Standing, shared};
 use super::stats::quantile;
 use super::verdict::Verdict;
 
@@ -158,7 +158,7 @@ pub fn cases(rows: &[Row]) -> String {
         };
         let _ = writeln!(
             text,
-            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} linear={:.3} own={:?}/{:?} sep={:?} {:.1}s",
+            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} linear={:.3} own={:?}/{:?} sep={:?} {:.1}s{}",
             r.label.id,
             r.label.group,
             r.label.plant,
@@ -175,8 +175,23 @@ pub fn cases(rows: &[Row]) -> String {
             own.map(|f| (f.1 / f.0).sqrt()),
             r.verdict().and_then(|v| v.own_black_box),
             r.rivals.separation,
-            r.trial.seconds
+            r.trial.seconds,
+            asides(r)
         );
+    }
+    text
+}
+
+/// What came of a proposed experiment, and the numbers whose interval does not hold the truth.
+fn asides(r: &Row) -> String {
+    let mut text = String::new();
+    if let Some(s) = r.settled {
+        let word = |settles: bool| if settles { "settles" } else { "does not settle" };
+        let _ = write!(text, " experiment {}, a random input {}", word(s.proposed), word(s.random));
+    }
+    for p in shared(r).iter().filter(|p| !p.is_covered()) {
+        let (value, low, high) = p.told;
+        let _ = write!(text, " {}={value:.4e} ({low:.3e} to {high:.3e}) is {:.4e}", p.name, p.truth);
     }
     text
 }

@@ -104,23 +104,26 @@ impl NoiseModel {
         let total: usize = stretches.iter().map(|s| s.len()).sum();
         let mean = stretches.iter().flat_map(|s| s.iter()).sum::<f64>() / total as f64;
         let centred: Vec<Vec<f64>> = stretches.iter().map(|s| s.iter().map(|e| e - mean).collect()).collect();
-        let stretches: &[&[f64]] = &centred.iter().map(Vec::as_slice).collect::<Vec<_>>();
-        let ar = fit_ar(stretches, max_order);
+        let centred: Vec<&[f64]> = centred.iter().map(Vec::as_slice).collect();
+        let ar = fit_ar(&centred, max_order);
         let bent = corners(longest);
         let mut seen = vec![ar.order()];
-        let mut best = ar.shaped(stretches, &[even_knots(longest), bent.clone()].concat());
-        let mut most = best.score(stretches);
+        let mut best = ar.shaped(&centred, &[even_knots(longest), bent.clone()].concat());
+        let mut most = best.score(&centred);
         for order in SHORT_ORDERS {
-            let short = fit_ar(stretches, order);
+            let short = fit_ar(&centred, order);
             if !seen.contains(&short.order()) {
                 seen.push(short.order());
-                let shaped = short.shaped(stretches, &bent);
-                let score = shaped.score(stretches);
+                let shaped = short.shaped(&centred, &bent);
+                let score = shaped.score(&centred);
                 if score > most {
                     (best, most) = (shaped, score);
                 }
             }
         }
+        best.below = Below::rising(best.exponent(longest));
+        // What a force has moved by then is in the mean too, and most of it where the plant integrates.
+        most = best.score(stretches);
         let price = 0.5 * (total as f64).ln();
         // What looks white to an autoregression may hide a little of a force; most often it does not, and two looks tell.
         let white = best.coefficients() == 0;
@@ -131,10 +134,10 @@ impl NoiseModel {
             let Some((driven, likelihood)) = Driven::fit(path, stretches, price, most) else { continue };
             let score = likelihood - price * driven.coefficients() as f64;
             if score > most {
-                (best, most) = (Self { kind: Kind::Driven(driven), below: Below::LEVEL }, score);
+                let driven = Self { kind: Kind::Driven(driven), below: Below::LEVEL };
+                (best, most) = (Self { below: Below::rising(driven.exponent(longest)), ..driven }, score);
             }
         }
-        best.below = Below::rising(best.exponent(longest));
         best
     }
 

@@ -19,7 +19,8 @@ use hysid_concealed::noise::Noise;
 
 use self::breakdown::{cell, competitors, confusion};
 use self::line::{figure, plain, share, told};
-use self::numbers::{jump, parameters};
+use self::numbers::jump;
+pub use self::numbers::shared;
 use self::row::over_oracle;
 use self::statements::firm_and_wrong;
 use super::experiment::Settled;
@@ -241,10 +242,11 @@ pub fn score(rows: &[Row]) -> Score {
     (line.value, line.interval) = (-line.value, (-line.interval.1, -line.interval.0));
     lines.push(line);
 
-    let parameters: Vec<(f64, bool, f64)> = known.iter().flat_map(|r| parameters(r)).collect();
-    let middle: Vec<f64> = parameters.iter().filter(|p| (0.4..0.7).contains(&p.2)).map(|p| p.0).collect();
+    let parameters: Vec<_> = known.iter().flat_map(|r| shared(r).into_iter().map(|p| (p, r.label.dnr))).collect();
+    let middle: Vec<f64> =
+        parameters.iter().filter(|(_, dnr)| (0.4..0.7).contains(dnr)).map(|(p, _)| p.error()).collect();
     lines.push(figure("Parameters: median relative error at DNR 0.5", "<= 5 %", &middle, 0.5, 0.05, false));
-    let covered = parameters.iter().filter(|p| p.1).count();
+    let covered = parameters.iter().filter(|(p, _)| p.is_covered()).count();
     let mut line =
         share("Parameters: 95 % intervals cover", "90 to 97 %", covered, parameters.len(), 0.90, false, false);
     if line.value > 0.97 {

@@ -64,8 +64,30 @@ const SAME_NUMBER: &[(&str, &str, &str)] = &[
     ("periodic_disturbance", "f", "f_d"),
 ];
 
-/// Relative error, coverage and difficulty of every number that truth and diagnosis share, where the mechanism was right.
-pub(super) fn parameters(r: &Row) -> Vec<(f64, bool, f64)> {
+/// A number that truth and diagnosis share.
+pub struct Shared {
+    /// Mechanism and parameter, as the diagnosis names them.
+    pub name: String,
+    /// Its size in truth.
+    pub truth: f64,
+    /// As it was told, with the sign that the truth has; the ends of the interval are no numbers where none was given.
+    pub told: (f64, f64, f64),
+}
+
+impl Shared {
+    /// Error over the truth.
+    pub fn error(&self) -> f64 {
+        (self.told.0 / self.truth - 1.0).abs()
+    }
+
+    /// Whether the interval holds the truth.
+    pub fn is_covered(&self) -> bool {
+        self.told.1 <= self.truth && self.truth <= self.told.2
+    }
+}
+
+/// Every number that truth and diagnosis share, where the mechanism was right.
+pub fn shared(r: &Row) -> Vec<Shared> {
     let mut list = Vec::new();
     for e in &r.label.effects {
         let guess = r.guess();
@@ -77,8 +99,8 @@ pub(super) fn parameters(r: &Row) -> Vec<(f64, bool, f64)> {
             let found = s.parameters.iter().find(|p| p.0 == *theirs);
             if let (true, Some(truth), Some(&(_, value, low, high))) = (*mechanism == e.mechanism, truth, found) {
                 if truth > 0.0 {
-                    let (a, b) = if value < 0.0 { (-high, -low) } else { (low, high) };
-                    list.push(((value.abs() / truth - 1.0).abs(), a <= truth && truth <= b, r.label.dnr));
+                    let (low, high) = if value < 0.0 { (-high, -low) } else { (low, high) };
+                    list.push(Shared { name: format!("{mechanism}.{theirs}"), truth, told: (value.abs(), low, high) });
                 }
             }
         }
