@@ -260,3 +260,67 @@ pub fn log_weights(
         })
         .collect()
 }
+
+#[cfg(test)]
+#[path = "../tests/common/oscillator.rs"]
+mod oscillator;
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
+    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use super::*;
+    use crate::base::NoiseKind;
+    use crate::budget::Budget;
+    use crate::data::DataSet;
+    use crate::fitting::refit;
+    use crate::model::Values;
+    use crate::screen::screen;
+
+    /// A small offset of a sensor and one of the input leave the same; a spring that bends says something else.
+    #[test]
+    fn an_offset_of_input_and_sensor_are_one_statement() {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut random = normal(3);
+        let u = drive(800, &mut random);
+        let mut y = respond(&u, REAL, |_, _| 0.0);
+        let noise = 0.02 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * (random() + 0.1));
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let budget = Budget::new(&|_| false);
+        let mut setting = Setting {
+            data: &data,
+            own_states: original.states.iter().map(|s| s.name.clone()).collect(),
+            original,
+            pushed: Vec::new(),
+            substeps: 2,
+            own_unknowns: 0,
+            iterations: 12,
+            noise: NoiseKind::White(1.0),
+            budget: &budget,
+        };
+        let base = setting.fit(&setting.original, &Values::default(), None, 3, 25).unwrap();
+        setting.own_unknowns = base.model.unknowns().len();
+        let none = setting.hypothesis(Vec::new(), base);
+        let wanted = ["input_offset", "output_offset", "cubic_stiffness"];
+        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| wanted.contains(&m.id));
+        let fitted = |id: &str| refit(&setting, &none, found.iter().find(|c| c.mechanism.id == id).unwrap()).unwrap();
+        let mut pool: Vec<Hypothesis<'_>> = wanted.into_iter().map(fitted).collect();
+        pool.push(none);
+        assert_eq!(wordings(&pool, 0), [2, 2, 1, 1]);
+        // Together they weigh what one alone does.
+        let weigh_all = |pool: &[Hypothesis<'_>]| {
+            let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
+            log_weights(pool, &weighed, &vec![None; pool.len()], 0, 0.4)
+        };
+        let both = weigh_all(&pool);
+        pool.remove(1);
+        let alone = weigh_all(&pool);
+        let sum = both[0] + (both[1] - both[0]).exp().ln_1p();
+        assert!((sum - alone[0]).abs() < 0.2, "{both:?} {alone:?}");
+    }
+}

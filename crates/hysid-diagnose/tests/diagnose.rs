@@ -4,6 +4,8 @@
 mod actuator;
 #[path = "common/oscillator.rs"]
 mod oscillator;
+#[path = "diagnose/store.rs"]
+mod store;
 
 use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose};
