@@ -148,3 +148,28 @@ impl<'d> Setting<'d> {
         base.log_likelihood - self.noise.price(self.own_unknowns, further, self.data.rows())
     }
 }
+
+/// For tests: a simulation calibrated on a data set from its own values, and what its fits share.
+#[cfg(test)]
+pub fn calibrated<'d>(
+    original: Simulation,
+    data: &'d DataSet,
+    noise: NoiseKind,
+    budget: &'d Budget<'d>,
+) -> (Setting<'d>, Hypothesis<'d>) {
+    let mut setting = Setting {
+        data,
+        own_states: original.states.iter().map(|s| s.name.clone()).collect(),
+        pushed: crate::force::pushed(&original),
+        original,
+        substeps: 2,
+        own_unknowns: 0,
+        iterations: 12,
+        noise,
+        budget,
+    };
+    let base = setting.fit(&setting.original, &Values::default(), None, 3, 25).unwrap();
+    setting.own_unknowns = base.model.unknowns().len();
+    let none = setting.hypothesis(Vec::new(), base);
+    (setting, none)
+}

@@ -190,8 +190,7 @@ mod tests {
     use super::*;
     use crate::base::NoiseKind;
     use crate::budget::Budget;
-    use crate::force::pushed;
-    use crate::model::Values;
+    use crate::hypothesis::calibrated;
     use crate::screen::screen;
 
     proptest! {
@@ -236,23 +235,7 @@ mod tests {
     fn p_value(data: &DataSet) -> Option<f64> {
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let budget = Budget::new(&|_| false);
-        let own_states = original.states.iter().map(|s| s.name.clone()).collect();
-        let pushed = pushed(&original);
-        let noise = NoiseKind::Coloured;
-        let mut setting = Setting {
-            data,
-            original,
-            own_states,
-            pushed,
-            substeps: 2,
-            own_unknowns: 0,
-            iterations: 12,
-            noise,
-            budget: &budget,
-        };
-        let base = setting.fit(&setting.original, &Values::default(), None, 3, 25).unwrap();
-        setting.own_unknowns = base.model.unknowns().len();
-        let none = setting.hypothesis(Vec::new(), base);
+        let (setting, none) = calibrated(original, data, NoiseKind::Coloured, &budget);
         assert!(none.base.whitener.coefficients() > 0);
         let candidates = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|_, _| true);
         by_rehearsal(&setting, &none, &candidates, None, 0.005, 1)

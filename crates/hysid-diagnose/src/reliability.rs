@@ -4,7 +4,7 @@
 //! same. They are not: evidence counts with a weight of 0.4, and rules cap what something speaks against, both to keep a wrong name from
 //! being firm. What then stands below [`FIRM`] is an order, not a frequency, and the way from one to the other is empirical: a logistic map with a
 //! slope, and a term for sets of several effects, whose members are right less often than their support says. In a set that is called an
-//! imitation of something outside the catalogue one member in nine was right.
+//! imitation of something outside the catalogue one member in ten was right.
 //!
 //! The map only moves what is below [`FIRM`], and nothing of it above [`NOT_FIRM`]: whether a statement is firm is settled before. Figures: `cargo
 //! xtask reliability`, from statements of development seeds 51, 71, 81, 91 and 101 (`xtask/reliability/`).

@@ -141,18 +141,23 @@ pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
     places.iter().filter_map(|n| base.model.place_of(n)).any(|place| base.fit.at_bound[place])
 }
 
-/// Whether two sets say the same of families and slots and differ in members only.
-fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
-    let kinds = |h: &Hypothesis<'_>| {
-        let mut k: Vec<(&str, String)> =
-            h.effects.iter().map(|e| (e.mechanism.family.name(), e.slot.label.clone())).collect();
-        k.sort();
-        k
-    };
-    kinds(a) == kinds(b)
+/// What a set says of each of its effects, in an order of its own.
+fn sorted<'h, T: Ord>(h: &'h Hypothesis<'_>, of: impl Fn(&'h Effect) -> T) -> Vec<T> {
+    let mut all: Vec<T> = h.effects.iter().map(of).collect();
+    all.sort_unstable();
+    all
 }
 
-/// Squared difference of two predictions, in units of the noise, below which no recording of this length tells them apart.
+/// Whether two sets say the same of families and slots and differ in members only.
+fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
+    fn kind(e: &Effect) -> (&str, &str) {
+        (e.mechanism.family.name(), &e.slot.label)
+    }
+    sorted(a, kind) == sorted(b, kind)
+}
+
+/// Squared difference of two predictions, in units of the noise, and difference of their log evidence, below which no recording of this length
+/// tells them apart.
 const SAME: f64 = 1.0;
 /// Log evidence by which a set may trail and its other wordings still matter.
 const NEAR: f64 = 12.0;
@@ -161,14 +166,7 @@ const NEAR: f64 = 12.0;
 /// one of the sensor of a linear plant are one statement; told twice, they would count twice against another family.
 fn wordings(pool: &[Hypothesis<'_>], winner: usize) -> Vec<usize> {
     let best = &pool[winner];
-    let families: Vec<Vec<&str>> = pool
-        .iter()
-        .map(|h| {
-            let mut of: Vec<&str> = h.effects.iter().map(|e| e.mechanism.family.name()).collect();
-            of.sort_unstable();
-            of
-        })
-        .collect();
+    let families: Vec<Vec<&str>> = pool.iter().map(|h| sorted(h, |e| e.mechanism.family.name())).collect();
     let layout = &best.base.model.data().layout;
     let same = |a: &Hypothesis<'_>, b: &Hypothesis<'_>| {
         let difference: Vec<f64> = a.base.fit.residual.iter().zip(&b.base.fit.residual).map(|(a, b)| a - b).collect();
@@ -276,7 +274,7 @@ mod tests {
     use crate::budget::Budget;
     use crate::data::DataSet;
     use crate::fitting::refit;
-    use crate::model::Values;
+    use crate::hypothesis::calibrated;
     use crate::screen::screen;
 
     /// A small offset of a sensor and one of the input leave the same; a spring that bends says something else.
@@ -292,20 +290,7 @@ mod tests {
         let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
         let data = DataSet::new(&original, &[recording], 3).unwrap();
         let budget = Budget::new(&|_| false);
-        let mut setting = Setting {
-            data: &data,
-            own_states: original.states.iter().map(|s| s.name.clone()).collect(),
-            original,
-            pushed: Vec::new(),
-            substeps: 2,
-            own_unknowns: 0,
-            iterations: 12,
-            noise: NoiseKind::White(1.0),
-            budget: &budget,
-        };
-        let base = setting.fit(&setting.original, &Values::default(), None, 3, 25).unwrap();
-        setting.own_unknowns = base.model.unknowns().len();
-        let none = setting.hypothesis(Vec::new(), base);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let wanted = ["input_offset", "output_offset", "cubic_stiffness"];
         let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| wanted.contains(&m.id));
         let fitted = |id: &str| refit(&setting, &none, found.iter().find(|c| c.mechanism.id == id).unwrap()).unwrap();

@@ -248,9 +248,7 @@ impl Unit {
 
 /// A known name with the power that may follow it: `m3` is a cubic metre.
 fn powered(text: &str) -> Option<(&str, i32)> {
-    let (name, exponent) = match text.char_indices().next_back()? {
-        (at, digit @ ('2' | '3')) => (&text[..at], i32::from(digit == '3') + 2),
-        _ => (text, 1),
-    };
+    let to_the = |digit: char, power: i32| text.strip_suffix(digit).map(|name| (name, power));
+    let (name, exponent) = to_the('2', 2).or_else(|| to_the('3', 3)).unwrap_or((text, 1));
     exponents(name).map(|_| (name, exponent))
 }

@@ -234,21 +234,19 @@ mod tests {
     }
 
     #[test]
-    fn a_little_of_a_force_is_found_more_often_than_an_autoregression_sees_a_colour() {
+    fn a_little_of_a_force_is_found_where_an_autoregression_sees_white_noise() {
         let path = integrator();
-        let (mut found, mut coloured) = (0, 0);
-        for seed in 0..20 {
+        for seed in 0..5 {
             let recorded = |size: f64| simulated(&path, &white(2000, 50 + seed), size, seed);
             let fit = |e: &[f64], paths: &[ForcePath]| NoiseModel::fit(&[e], 16, paths);
             assert!(!fit(&recorded(0.0), std::slice::from_ref(&path)).is_driven(), "{seed}");
-            found += usize::from(fit(&recorded(LITTLE), std::slice::from_ref(&path)).is_driven());
-            coloured += usize::from(fit(&recorded(LITTLE), &[]).coefficients() > 0);
+            assert!(fit(&recorded(LITTLE), std::slice::from_ref(&path)).is_driven(), "{seed}");
+            assert_eq!(fit(&recorded(LITTLE), &[]).coefficients(), 0, "{seed}");
         }
-        assert!(found >= 15 && coloured <= 2, "{found} {coloured}");
     }
 
-    /// Size of a force through an integrator of which autoregressions mostly see nothing in 2000 samples.
-    const LITTLE: f64 = 0.16;
+    /// Size of a force through an integrator of which autoregressions see nothing in 2000 samples.
+    const LITTLE: f64 = 0.12;
 
     #[test]
     fn other_noise_is_not_taken_for_process_noise() {

@@ -121,7 +121,7 @@ impl NoiseModel {
                 }
             }
         }
-        best.below = Below::rising(best.exponent(longest));
+        best = best.with_below(longest);
         // What a force has moved by then is in the mean too, and most of it where the plant integrates.
         most = best.score(stretches);
         let price = 0.5 * (total as f64).ln();
@@ -135,10 +135,15 @@ impl NoiseModel {
             let score = likelihood - price * driven.coefficients() as f64;
             if score > most {
                 let driven = Self { kind: Kind::Driven(driven), below: Below::LEVEL };
-                (best, most) = (Self { below: Below::rising(driven.exponent(longest)), ..driven }, score);
+                (best, most) = (driven.with_below(longest), score);
             }
         }
         best
+    }
+
+    /// With what lies below the lowest line of `n` samples in the mean.
+    fn with_below(self, n: usize) -> Self {
+        Self { below: Below::rising(self.exponent(n)), ..self }
     }
 
     /// The exponent by which the power goes on rising below the lowest line of `n` samples.

@@ -12,12 +12,14 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
     applies: |slot| slot.inputs() > 0 && (slot.place == Place::Sensor || slot.has("x")),
     already: &[],
     law: |slot, _| {
+        // A sharp resonance between two points of the grid shows in neither; a broad one does.
+        let (frequencies, dampings) = (Grid::Band(25), Grid::Values(vec![0.02, 0.15]));
         if slot.place == Place::Force {
             // A mass on a spring that hangs on the moving part: the force that accelerates it is missing there.
             return Law::force("m_a*((2*pi*f_a)^2*(x - x_a) + 4*pi*f_a*zeta_a*(v - v_a))")
                 .amplitude("m_a", slot.mass_measure(), 0.0, 5.0)
-                .shape("f_a", "1/t", Grid::Band(25))
-                .shape("zeta_a", "1", Grid::Values(vec![0.02, 0.15]))
+                .shape("f_a", "1/t", frequencies)
+                .shape("zeta_a", "1", dampings)
                 .within(0.001, 0.7)
                 .state("x_a", "x", "v_a")
                 .starting_like("x")
@@ -34,7 +36,7 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
         for i in 1..=slot.inputs() {
             law = law.amplitude(format!("b_{i}"), format!("y/u_{i}"), -3.0, 3.0);
         }
-        law.shape("f_a", "1/t", Grid::Band(25)).shape("zeta_a", "1", Grid::Values(vec![0.02, 0.15])).within(0.001, 0.7)
+        law.shape("f_a", "1/t", frequencies).shape("zeta_a", "1", dampings).within(0.001, 0.7)
     },
     contains: &[],
     confusable: &["delay", "viscoelastic"],
