@@ -290,9 +290,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         file.notes.push("simulation and recording differ by more than noise does, but no effect and no generic term outweighs what its parameters cost: what is told is the likeliest, and no augmented simulation is written".into());
     }
     let gamble = if winner > 0 && !vetoed { gamble(setting, &contest) } else { None };
-    if let Some(loss) = gamble {
-        let loss = if loss.is_finite() { number(loss) } else { "infinitely many".into() };
-        file.notes.push(format!("on the recorded inputs mirrored and reversed in time the sets of effects that remain differ: if one of the others is the true one, the set that is told has on average {loss} times the squared error of the simulation as it is: no augmented simulation is written, since it may be worse than nothing there"));
+    if let Some(share) = gamble {
+        file.notes.push(format!("on the recorded inputs mirrored and reversed in time the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): no augmented simulation is written, since it may be worse than nothing there", number(share)));
     }
     let named = if winner > 0 && !vetoed && gamble.is_none() && !left.foreign { winner } else { 0 };
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {

@@ -120,10 +120,11 @@ fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
     (count > 4.0).then_some((mean, (variance / count).sqrt()))
 }
 
-/// Whether the winner predicts the held-out blocks no better than the simulation as it is.
+/// Whether the winner predicts the held-out blocks worse than the simulation as it is, by more than a standard error: an effect that acts at a few
+/// moments only may leave all blocks as they are.
 pub fn worse_on_blocks(blocks: &[Option<(f64, Vec<f64>)>], winner: usize) -> bool {
     let (Some(Some((_, none))), Some(Some((_, best)))) = (blocks.first(), blocks.get(winner)) else { return false };
-    difference(best, none).is_some_and(|(mean, _)| mean > 0.0)
+    difference(best, none).is_some_and(|(mean, error)| mean > error)
 }
 
 /// Probability that squared errors on blocks fall by so much by chance, one-sided; `None` where the blocks are too few.
