@@ -175,6 +175,30 @@ fn static_operators_follow_their_definitions() {
 }
 
 #[test]
+fn a_half_width_may_grow_with_the_step_from_the_sample_before() {
+    let amplitude = |t: f64| (47.0 * t).sin() + 0.3 * (310.0 * t).cos();
+    // A held input moves at its samples, a linear one between them too, where two steps for each sample meet it halfway.
+    for (hold, points) in [("zero", 1), ("linear", 2)] {
+        let states: [(&str, &str, &str); 1] = [("x", "play(u, r*(1 + s*abs(u - delay(u, h)))) - x", "0.0")];
+        let outputs = [("widening", "play(u, r*(1 + s*abs(u - delay(u, h))))"), ("x", "x")];
+        let compiled = model(hold, &[("r", 0.2), ("s", 1.5), ("h", 0.01)], &states, &outputs);
+        let y = simulate(&compiled, &drive(3000, amplitude), 2);
+        let sample = |n: i32| amplitude(0.01 * f64::from(n.max(0)));
+        let mut widening = amplitude(0.0);
+        for i in 0..3000 * points {
+            let (n, share) = (i / points, f64::from(i % points) / f64::from(points));
+            let at = |n: i32| sample(n) + share * (sample(n + 1) - sample(n));
+            // Before the first sample everything is at rest.
+            let before = if n == 0 { sample(0) } else { at(n - 1) };
+            let half = 0.2 * (1.0 + 1.5 * (at(n) - before).abs());
+            widening = widening.clamp(at(n) - half, at(n) + half);
+            let found = y.outputs[0][n as usize];
+            assert!(share > 0.0 || (found - widening).abs() < 1e-9, "{hold} {n}: {found} {widening}");
+        }
+    }
+}
+
+#[test]
 fn an_explosion_is_a_result() {
     let compiled = model("linear", &[("a", 50.0)], &[("x", "a*x^3 + u", "1.0")], &[("y", "x")]);
     let y = simulate(&compiled, &drive(100, |_| 0.0), 4);

@@ -249,7 +249,8 @@ impl Simulation {
                     |a: &Expr| !a.has_memory() && a.symbols().iter().all(|s| s == "pi" || self.parameter(s).is_some());
                 let nested = |a: &Expr| {
                     let mut found = false;
-                    a.visit(&mut |e| found |= matches!(e, Expr::Memory(memory, _) if *memory != Memory::Derivative));
+                    let rests = |m: &Memory| matches!(m, Memory::Derivative | Memory::Delay);
+                    a.visit(&mut |e| found |= matches!(e, Expr::Memory(memory, _) if !rests(memory)));
                     found
                 };
                 match memory {
@@ -266,7 +267,7 @@ impl Simulation {
                             );
                         }
                     }
-                    // A half-width may widen with the rate of an input; it must not rest on what moves with the play.
+                    // A half-width may widen with the rate of an input, or with what it was before; it must not rest on what moves with the play.
                     Memory::Play => {
                         if arguments
                             .iter()
@@ -274,7 +275,7 @@ impl Simulation {
                             .any(|a| a.symbols().iter().any(|s| self.state(s).is_some()) || nested(a))
                         {
                             message = Some(
-                                "the half-width of `play` must be made of parameters, numbers and inputs only"
+                                "the half-width of `play` must be made of parameters, numbers, inputs, their derivatives and delayed inputs only"
                                     .to_owned(),
                             );
                         }

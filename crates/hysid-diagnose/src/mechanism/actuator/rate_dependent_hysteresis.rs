@@ -1,7 +1,7 @@
 //! Hysteresis of an actuator whose loop widens with the rate.
 
 use super::plays::Plays;
-use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere, log_grid};
+use crate::mechanism::{Block, Family, Grid, Mechanism, Need, Purpose, anywhere, log_grid};
 use crate::slot::Place;
 
 /// Hysteresis of an actuator whose loop widens with the rate.
@@ -13,18 +13,21 @@ pub static RATE_DEPENDENT_HYSTERESIS: Mechanism = Mechanism {
     applies: anywhere,
     already: &["lag(play(u, R), P)"],
     law: |_, purpose| {
-        // Plays in series with a lag. Thresholds that grow with the rate do the same to first order, each play by a lag of its own where they
-        // grow in proportion; only sharp recordings tell the difference.
+        // Plays in series with a lag do to first order what thresholds that grow with the rate do, each play by a lag of its own where they
+        // grow in proportion; only sharp recordings tell the difference. The rate is that of the way from the sample before: a central
+        // difference is nearly blind to what turns at every sample, and such inputs widen the loop most.
         let plays = Plays(purpose);
-        let wide = |r: &str| format!("play(u, {r}*(1 + lambda*abs(d(u))))");
-        let lag = |law: Law| law.shape("tau", "h", log_grid(0.5, 50.0, 4)).within(0.05, 1000.0);
-        let growth = |law: Law| law.shape("lambda", "h/u", Grid::Values(vec![5.0])).within(0.0, 1000.0);
+        let wide = |r: &str| format!("play(u, {r}*(1 + lambda*abs(u - delay(u, h_u))/h_u))");
         match purpose {
-            Purpose::Screening | Purpose::Refit => lag(plays.law(plays.sum(|r| format!("lag(play(u, {r}), tau)")))),
-            Purpose::Form(Form::Smooth) => growth(plays.law(plays.sum(wide))),
-            Purpose::Form(Form::Finer | Form::Spaced) => {
-                growth(lag(plays.law(plays.sum(|r| format!("lag({}, tau)", wide(r))))))
-            }
+            Purpose::Screening | Purpose::Refit => plays
+                .law(plays.sum(|r| format!("lag(play(u, {r}), tau)")))
+                .shape("tau", "h", log_grid(0.5, 50.0, 4))
+                .within(0.05, 1000.0),
+            Purpose::Form(_) => plays
+                .law(plays.sum(wide))
+                .shape("lambda", "h/u", Grid::Values(vec![0.5, 5.0]))
+                .within(0.0, 1000.0)
+                .constant("h_u", "h", Grid::Values(vec![1.0])),
         }
     },
     contains: &["prandtl_ishlinskii", "backlash"],
