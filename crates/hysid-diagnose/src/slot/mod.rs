@@ -152,6 +152,21 @@ impl Slot {
         self.mass
     }
 
+    /// Whether the slot is a parameter that dissipates power: one that a velocity is multiplied by.
+    pub(crate) fn dissipates(&self) -> bool {
+        let (Some(parameter), Some(v)) = (self.quantity("p"), self.quantity("v")) else { return false };
+        let uses = |e: &Expr, quantity: &Quantity| quantity.expression.symbols().iter().any(|s| e.uses(s));
+        let mut found = false;
+        for equation in &self.context {
+            equation.visit(&mut |e| {
+                if let Expr::Binary(hysid_plant::BinaryOp::Mul, a, b) = e {
+                    found |= (uses(a, parameter) && uses(b, v)) || (uses(a, v) && uses(b, parameter));
+                }
+            });
+        }
+        found
+    }
+
     /// The measure of a mass here: `m` where there is one, else a pure number.
     pub(crate) fn mass_measure(&self) -> &'static str {
         if self.has("m") { "m" } else { "1" }

@@ -12,7 +12,7 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     applies: anywhere,
     already: &["max(min(u, P), Q)", "min(max(u, P), Q)", "u - P*max(u - Q, 0)"],
     law: |slot, purpose| {
-        let level = Grid::Quantiles("u", vec![0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 0.997]);
+        let level = Grid::Quantiles("u", vec![0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 0.997, 0.9995]);
         if slot.place == Place::Between {
             // A stage inside a circuit or a drive train rarely cuts alike on both sides, or off: a diode bends one side only.
             return Law::replace("u - a_p*max(u - s, 0) - a_n*min(u + s, 0)")

@@ -11,12 +11,14 @@ pub static DISSIPATION_HEATING: Mechanism = Mechanism {
     places: &[Place::Parameter],
     applies: |slot| slot.has("v") && !slot.is_mass(),
     already: &["p*(1 + P*Z)"],
-    law: |_, _| {
+    law: |slot, _| {
+        // What dissipates less when it is hot heats itself less.
+        let heat = if slot.dissipates() { "((1 + beta*theta)*v^2 - theta)/tau_h" } else { "(v^2 - theta)/tau_h" };
         Law::replace("p*(1 + beta*theta)")
             .amplitude("beta", "1/v^2", -0.9, 3.0)
             .shape("tau_h", "T", Grid::Values(vec![0.05, 0.2, 0.6]))
             .within(0.01, 5.0)
-            .state("theta", "v^2", "(v^2 - theta)/tau_h")
+            .state("theta", "v^2", heat)
     },
     contains: &[],
     confusable: &["parameter_drift", "degradation"],
