@@ -113,7 +113,7 @@ pub fn through_hysteresis(values: &[f64], effects: &[Effect], period: f64) -> Ve
 /// Preisach's model: relays everywhere on the triangle `beta <= alpha` of thresholds within `u_max`, weight Gaussian about the diagonal with a skew
 /// `bend` along it; `share` of the output is theirs. A relay of half-width `r` and centre `c` is up where the play of that half-width is above `c`
 /// (Brokate and Sprekels 1996, sec. 2.4), so the centres are integrated in closed form and the half-widths are summed. A grid of relays
-/// would be a staircase, which is another effect: with 40 thresholds its steps were a sixth of the hysteresis.
+/// would be a staircase, which is another effect and no label would tell it.
 fn preisach(u: &[f64], p: &[f64], bend: f64) -> Vec<f64> {
     const WIDTHS: usize = 80;
     let (share, u_max, spread) = (p[0], p[1], p[2]);

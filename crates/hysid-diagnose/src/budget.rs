@@ -22,8 +22,10 @@ pub enum Step {
     Rivals,
     /// Variants of the simulation's own numerics.
     Numerics,
-    /// Further effects, drops and swaps.
+    /// Further effects and swaps.
     Composition,
+    /// The set without each of its effects.
+    Drops,
     /// Sets fitted under another noise model.
     OtherNoise,
     /// The second look on simulated recordings.
@@ -43,6 +45,7 @@ impl Step {
             Self::Rivals => "rivals of the best effect",
             Self::Numerics => "the simulation's own numerics",
             Self::Composition => "further effects",
+            Self::Drops => "whether each effect is needed",
             Self::OtherNoise => "fits under another noise model",
             Self::Rehearsal => "the second look on simulated recordings",
             Self::Blocks => "rivals on held-out blocks",
@@ -73,7 +76,7 @@ impl<'a> Budget<'a> {
     /// Whether a step of the search must be left out; it is remembered.
     pub fn omits(&self, step: Step) -> bool {
         let share = match step {
-            Step::Remains => TESTS,
+            Step::Remains | Step::Drops => TESTS,
             Step::Blocks | Step::Experiment => WHOLE,
             _ => SEARCH,
         };

@@ -194,21 +194,27 @@ pub fn compose<'d>(
     for _ in 0..ROUNDS {
         let Some(best) = best_of(pool) else { return };
         let n = pool[best].effects.len();
-        if n < 2 || enough() {
+        if n < 2 || setting.budget.omits(Step::Drops) {
             return;
         }
         let (before, evidence) = (pool[best].key(), pool[best].log_evidence);
+        let rests: Vec<(usize, Hypothesis<'d>)> =
+            (0..n).filter_map(|index| Some((index, without(setting, none, &pool[best], index)?))).collect();
+        // What remains may come to rest where it had not come alone: then the other was no more than the way there.
+        if rests.iter().any(|(_, rest)| rest.log_evidence > evidence - LEAST_GAIN) {
+            rests.into_iter().for_each(|(_, rest)| add(pool, rest));
+            continue;
+        }
         let mut found = Vec::new();
-        for index in 0..n {
+        for (index, rest) in &rests {
             if enough() {
                 break;
             }
-            let Some(rest) = without(setting, none, &pool[best], index) else { continue };
-            let candidates = around(&rest);
-            found.extend(swapped(setting, none, &pool[best], index, &candidates));
-            found.extend(extended(setting, &rest, &candidates, options, Some(&pool[best].effects[index])));
-            found.push(rest);
+            let candidates = around(rest);
+            found.extend(swapped(setting, none, &pool[best], *index, &candidates));
+            found.extend(extended(setting, rest, &candidates, options, Some(&pool[best].effects[*index])));
         }
+        found.extend(rests.into_iter().map(|(_, rest)| rest));
         for h in found {
             add(pool, h);
         }

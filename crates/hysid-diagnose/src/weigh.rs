@@ -278,6 +278,18 @@ mod tests {
     use crate::hypothesis::calibrated;
     use crate::screen::screen;
 
+    #[test]
+    fn blocks_veto_what_they_refute_and_not_what_they_do_not_show() {
+        let mut random = normal(8);
+        let none: Vec<f64> = (0..400).map(|_| random().powi(2)).collect();
+        let judged = |of_best: Vec<f64>| worse_on_blocks(&[Some((0.0, none.clone())), Some((0.0, of_best))], 1);
+        // One effect leaves all blocks as they are but for what its parameters cost, one is better, one is worse throughout.
+        assert!(!judged(none.clone()));
+        assert!(!judged(none.iter().enumerate().map(|(i, e)| e + if i % 40 < 20 { 0.1 } else { -0.099 }).collect()));
+        assert!(!judged(none.iter().map(|e| 0.8 * e).collect()));
+        assert!(judged(none.iter().map(|e| 1.2 * e).collect()));
+    }
+
     /// A small offset of a sensor and one of the input leave the same; a spring that bends says something else.
     #[test]
     fn an_offset_of_input_and_sensor_are_one_statement() {

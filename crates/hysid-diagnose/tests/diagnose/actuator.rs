@@ -11,6 +11,7 @@ const BASELINE: &str = r#"
 title = "Actuator"
 [time]
 column = "t_s"
+hold = "zero"
 [inputs]
 u = "u_V"
 [parameters]
@@ -22,16 +23,25 @@ y_um = "g*u"
 /// The gain of the real one, in um/V.
 const GAIN: f64 = 0.1;
 
-/// What a sum of plays (weight, half-width in V) makes of the input, in um, with noise of this size in um.
-fn recording(name: &str, seed: u64, plays: &[(f64, f64)], noise: f64) -> Recording {
+/// Plays (weight, half-width in V); the half-widths grow by `widening` of themselves for each volt of the step from the sample before.
+#[derive(Debug, Clone, Copy)]
+struct Loop<'a> {
+    plays: &'a [(f64, f64)],
+    widening: f64,
+}
+
+/// What a sum of plays makes of the input, in um, with noise of this size in um.
+fn recording(name: &str, seed: u64, Loop { plays, widening }: Loop<'_>, noise: f64) -> Recording {
     let mut random = normal(seed);
     let u = drive(1200, &mut random);
     // At rest before: each play in the middle of its band.
-    let mut held = vec![u[0]; plays.len()];
+    let (mut held, mut before) = (vec![u[0]; plays.len()], u[0]);
     let y = u.iter().map(|&u| {
+        let wider = 1.0 + widening * (u - before).abs();
+        before = u;
         let mut sum = u;
         for (z, (weight, radius)) in held.iter_mut().zip(plays) {
-            *z = z.clamp(u - radius, u + radius);
+            *z = z.clamp(u - radius * wider, u + radius * wider);
             sum += weight * (*z - u);
         }
         GAIN * sum + noise * random()
@@ -41,7 +51,7 @@ fn recording(name: &str, seed: u64, plays: &[(f64, f64)], noise: f64) -> Recordi
     Recording::new(name, Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap()
 }
 
-fn diagnosed(plays: &[(f64, f64)], noise: f64) -> Diagnosis {
+fn diagnosed(plays: Loop<'_>, noise: f64) -> Diagnosis {
     let simulation = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
     let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
     let request = Request {
@@ -74,7 +84,7 @@ fn plays_whose_widths_stand_nowhere_in_particular_are_found_with_their_spacing()
     let plays: Vec<(f64, f64)> =
         (1..=5).zip([0.04, 0.08, 0.03, 0.07, 0.05]).map(|(i, w)| (w, 3.1 * f64::from(i))).collect();
     let noise = 0.005;
-    let d = diagnosed(&plays, noise);
+    let d = diagnosed(Loop { plays: &plays, widening: 0.0 }, noise);
     let parameters = told(&d, noise, 1.1);
     let spacing = value(parameters, "r_s");
     assert!((spacing / 3.1 - 1.0).abs() < 0.02, "{spacing} V: {parameters:?}");
@@ -91,10 +101,22 @@ fn a_faint_loop_of_a_smooth_density_is_told_by_two_numbers() {
     let weight = |r: f64| 0.004 * (-(r / 12.0).powi(2)).exp();
     let plays: Vec<(f64, f64)> = (0..60).map(|i| 0.6 * (f64::from(i) + 0.5)).map(|r| (weight(r), r)).collect();
     let noise = 0.04;
-    let d = diagnosed(&plays, noise);
+    let d = diagnosed(Loop { plays: &plays, widening: 0.0 }, noise);
     let parameters = told(&d, noise, 1.05);
     let (width, share) = (value(parameters, "r_d"), value(parameters, "share"));
     let whole: f64 = plays.iter().map(|p| p.0).sum();
     assert!((width / 12.0).ln().abs() < 0.5, "{width} V: {parameters:?}");
     assert!((share / whole).ln().abs() < 0.5, "{share} for {whole}: {parameters:?}");
+}
+
+#[test]
+fn a_loop_that_widens_with_the_rate_of_a_rough_input_is_followed() {
+    // Five plays 2.5 V apart, twice as wide where the input steps by 4 V from one sample to the next.
+    let plays: Vec<(f64, f64)> = (1..=5).map(|i| (0.05, 2.5 * f64::from(i))).collect();
+    let noise = 0.005;
+    let d = diagnosed(Loop { plays: &plays, widening: 0.25 }, noise);
+    let parameters = told(&d, noise, 1.15);
+    assert_eq!(d.file.effects[0].mechanism, "rate_dependent_hysteresis", "{}", d.file.summary);
+    let growth = value(parameters, "lambda") / PERIOD;
+    assert!((growth / 0.25).ln().abs() < 0.1, "{growth} 1/V: {parameters:?}");
 }
