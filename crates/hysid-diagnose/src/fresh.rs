@@ -43,21 +43,25 @@ pub fn answered(document: &Simulation, drive: &Drive, substeps: usize) -> Option
     Some(empty.with_outputs(y))
 }
 
-/// The squared distance of two answers to one input, for each output, after the run-in.
-fn apart(a: &DataSet, b: &DataSet) -> Vec<f64> {
-    let outputs = a.stretches[0].outputs.iter().zip(&b.stretches[0].outputs);
-    outputs.map(|(a, b)| a.iter().zip(b).skip(a.len() / RUN_IN).map(|(a, b)| (a - b).powi(2)).sum()).collect()
+/// The squared distance of two answers to one input after the run-in, each output in units of its noise.
+fn apart(a: &DataSet, b: &DataSet, noise: &[f64]) -> f64 {
+    let outputs = a.stretches[0].outputs.iter().zip(&b.stretches[0].outputs).zip(noise);
+    let squares = outputs.map(|((a, b), noise)| {
+        a.iter().zip(b).skip(a.len() / RUN_IN).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / noise.powi(2)
+    });
+    squares.sum()
 }
 
-/// The share that writing a set has of what is lost by it and by writing nothing, the mean over the outputs that either changes: 0 where nothing
-/// is lost by the set, a half where both lose the same; `None` where neither loses anything.
-fn share(written: &[f64], not: &[f64]) -> Option<f64> {
-    let lost: Vec<(f64, f64)> = written.iter().copied().zip(not.iter().copied()).filter(|(w, n)| w + n > 0.0).collect();
-    (!lost.is_empty()).then(|| lost.iter().map(|(w, n)| w / (w + n)).sum::<f64>() / lost.len() as f64)
+/// The share that writing a set has of what is lost by it and by writing nothing: 0 where nothing is lost by the set, a half where both lose the
+/// same; `None` where neither loses anything.
+fn share(written: f64, not: f64) -> Option<f64> {
+    let share = written / (written + not);
+    share.is_finite().then_some(share)
 }
 
 /// The expected share of the loss that `set` has on this drive, if the truth is `set` with a probability of `own` and one of the rivals with
-/// theirs. Each truth has its share, so that a rival which goes far astray there does not outweigh all the others. One where the set diverges, `None`
+/// theirs; `noise` is that of each output. Each truth has its share, so that a rival which goes far astray there does not outweigh all the others.
+/// One where the set diverges, `None`
 /// where no set differs from the simulation as it is.
 fn expected_share(
     nothing: &Simulation,
@@ -65,15 +69,16 @@ fn expected_share(
     rivals: &[(f64, Simulation)],
     drive: &Drive,
     substeps: usize,
+    noise: &[f64],
 ) -> Option<f64> {
     let baseline = answered(nothing, drive, substeps)?;
     let Some(best) = answered(set, drive, substeps) else { return Some(1.0) };
     let truths = rivals.iter().filter_map(|(probability, rival)| {
         // A rival that diverges where the set does not is refuted by any machine that survives the input.
         let truth = answered(rival, drive, substeps)?;
-        share(&apart(&best, &truth), &apart(&baseline, &truth)).map(|share| (*probability, share))
+        share(apart(&best, &truth, noise), apart(&baseline, &truth, noise)).map(|share| (*probability, share))
     });
-    let own = share(&apart(&best, &best), &apart(&baseline, &best)).map(|share| (own, share));
+    let own = share(0.0, apart(&baseline, &best, noise)).map(|share| (own, share));
     let (all, of_set) =
         own.into_iter().chain(truths).fold((0.0, 0.0), |(all, of), (p, share)| (all + p, of + p * share));
     (all > 0.0).then(|| of_set / all)
@@ -92,13 +97,14 @@ pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
         return None;
     }
     let (nothing, best) = (started(&pool[0].base), started(&pool[winner].base));
+    let noise: Vec<f64> = pool[winner].base.whitener.models.iter().map(|m| m.noise_rms()).collect();
     let changes: [fn(&[f64]) -> Vec<f64>; 2] = [mirror_image, reversed];
     changes
         .into_iter()
         .filter_map(|change| {
             let inputs = recorded.inputs().iter().map(|u| faded(u, &change(u))).collect();
             let drive = Drive::new(recorded.start_s(), recorded.period_s(), recorded.len(), inputs).ok()?;
-            expected_share(&nothing, (probability[winner], &best), &rivals, &drive, setting.substeps)
+            expected_share(&nothing, (probability[winner], &best), &rivals, &drive, setting.substeps, &noise)
         })
         .max_by(f64::total_cmp)
         .filter(|loss| *loss > WORTH)
@@ -143,7 +149,7 @@ mod tests {
 
     /// Of writing a set, where the simulation as it is has a damping of 0.5.
     fn loss(own: f64, set: &Simulation, rivals: &[(f64, Simulation)]) -> Option<f64> {
-        expected_share(&drive(0.5, ""), (own, set), rivals, &pushed(), 4)
+        expected_share(&drive(0.5, ""), (own, set), rivals, &pushed(), 4, &[1.0])
     }
 
     #[test]
@@ -197,7 +203,7 @@ mod tests {
             "q = { derivative = \"u - b*q\", initial = 0.0 }\ns = { derivative = \"20*(q - s)\", initial = 0.0 }",
         ];
         let (input, sensor) = (stable(lags[0], "q"), stable(lags[1], "s"));
-        let of = expected_share(&nothing, (0.5, &input), &[(0.5, sensor)], &pushed(), 4).unwrap();
+        let of = expected_share(&nothing, (0.5, &input), &[(0.5, sensor)], &pushed(), 4, &[1.0]).unwrap();
         assert!(of < 1e-6, "{of}");
     }
 
