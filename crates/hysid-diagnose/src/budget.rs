@@ -34,6 +34,8 @@ pub enum Step {
     Blocks,
     /// The test of what remains.
     Remains,
+    /// The search once more, from better parameters or with shorter steps.
+    Again,
     /// The experiment; the verdict does not rest on it.
     Experiment,
 }
@@ -50,6 +52,7 @@ impl Step {
             Self::Rehearsal => "the second look on simulated recordings",
             Self::Blocks => "rivals on held-out blocks",
             Self::Remains => "the test of what remains",
+            Self::Again => "the search once more, from better parameters or with shorter steps",
             Self::Experiment => "an experiment",
         }
     }
@@ -82,9 +85,23 @@ impl<'a> Budget<'a> {
         };
         let late = (self.expired)(share);
         if late {
-            self.left_out.lock().unwrap_or_else(PoisonError::into_inner).insert(step);
+            self.remember(step);
         }
         late
+    }
+
+    /// Whether the search can be begun again where what was done of it so far takes so many times as long from here on.
+    pub fn affords(&self, times: f64) -> bool {
+        !(self.expired)(SEARCH / (1.0 + times))
+    }
+
+    /// Remembers that the search was not begun again for want of time.
+    pub fn not_again(&self) {
+        self.remember(Step::Again);
+    }
+
+    fn remember(&self, step: Step) {
+        self.left_out.lock().unwrap_or_else(PoisonError::into_inner).insert(step);
     }
 
     /// Whether something was left out on which the verdict rests.

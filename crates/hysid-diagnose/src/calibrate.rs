@@ -6,8 +6,10 @@ use crate::column::plant_data;
 use crate::data::DataSet;
 use crate::model::{Model, Values};
 
-/// Integration steps in each sampling period where the step-halving check gives no number, and the most that are spent.
-const SUBSTEPS: (usize, usize) = (2, 8);
+/// Integration steps in each sampling period where the step-halving check gives no number.
+const SUBSTEPS: usize = 2;
+/// The most that are spent.
+pub const MOST_SUBSTEPS: usize = 8;
 /// Steps for a simulation without states. It passes the check with one, but the memory that an effect adds to it does not: friction
 /// that slides within a sample was integrated wrongly, and the errors told were not those of the simulation that was written.
 const OF_STATIC: usize = 4;
@@ -16,10 +18,10 @@ const OF_STATIC: usize = 4;
 pub fn starts(model: &Model<'_>, simulation: &Simulation, seed: u64) -> (Vec<Values>, usize) {
     let own = model.values(&model.theta(&Values::default()));
     let mut out = Vec::new();
-    let mut substeps = SUBSTEPS.0;
+    let mut substeps = SUBSTEPS;
     if let Some((values, steps)) = global(model, simulation, seed) {
         out.push(values);
-        substeps = if simulation.is_static() { OF_STATIC } else { steps.clamp(1, SUBSTEPS.1) };
+        substeps = if simulation.is_static() { OF_STATIC } else { steps.clamp(1, MOST_SUBSTEPS) };
     }
     out.push(own);
     (out, substeps)

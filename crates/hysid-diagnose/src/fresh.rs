@@ -61,8 +61,7 @@ fn share(written: f64, not: f64) -> Option<f64> {
 
 /// The expected share of the loss that `set` has on this drive, if the truth is `set` with a probability of `own` and one of the rivals with
 /// theirs; `noise` is that of each output. Each truth has its share, so that a rival which goes far astray there does not outweigh all the others.
-/// One where the set diverges, `None`
-/// where no set differs from the simulation as it is.
+/// One where the set diverges, `None` where no set differs from the simulation as it is.
 fn expected_share(
     nothing: &Simulation,
     (own, set): (f64, &Simulation),

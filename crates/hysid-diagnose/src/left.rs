@@ -96,7 +96,7 @@ impl Left {
         if self.told().is_some_and(|o| o.words.is_some() && o.written.is_none()) {
             return None;
         }
-        let setting = search.setting;
+        let setting = &search.setting;
         let instead = if winner > 0 { search.open(&pool[0]) } else { None };
         let best = [(winner, self.open.as_ref()), (0, instead.as_ref())]
             .into_iter()

@@ -5,11 +5,10 @@ use hysid_signal::Recording;
 
 use crate::base::NoiseKind;
 use crate::budget::{Budget, Step};
-use crate::compose::{add, best_of};
 use crate::draw::{Sitting, picture};
 use crate::error::DiagnoseError;
-use crate::evidence::correlation_time;
 use crate::experiment::separating;
+use crate::explore::{Explored, LESSONS, explore};
 use crate::file::*;
 use crate::firmness::{firmness, likelihoods};
 use crate::force::pushed;
@@ -21,8 +20,7 @@ use crate::left::Left;
 use crate::picture::Picture;
 use crate::records::*;
 use crate::reliability::recalibrate;
-use crate::screen::screen;
-use crate::search::{Search, calibrate, leaves_more, words};
+use crate::search::{calibrate, leaves_more};
 use crate::text::number;
 use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, verdict};
 use crate::weigh::*;
@@ -126,19 +124,16 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let base = calibrate(&mut setting, request)?;
     (hooks.accepted)();
     setting.own_unknowns = base.model.unknowns().len();
-    let none = setting.hypothesis(Vec::new(), base);
-
-    (hooks.progress)("looking for what could be missing");
-    let evidence = none.base.evidence();
-    let mut candidates = screen(&none.base, simulation, &[], &evidence, &|_, _| true);
-    let residual_rms = by_column(simulation, &data.layout.rms(&none.base.fit.residual));
-    let detectable = detectability(&candidates);
+    let found = explore(&setting, base, request, hooks, LESSONS)?;
+    let Explored { search, pool, candidates, significant, p_value, residual, detectable, least, notes: heard } = found;
+    let (search, setting) = (&search, &search.setting);
+    let residual_rms = by_column(simulation, &residual);
     let mut file = DiagnosisFile {
         schema: SCHEMA.into(),
         verdict: VerdictKind::NoSignificantMismatch,
         summary: String::new(),
         mismatch: MismatchRecord {
-            p_value: None,
+            p_value: finite(p_value),
             residual_rms: residual_rms.clone(),
             noise_rms: residual_rms,
             detectable,
@@ -154,77 +149,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         notes,
         seed: options.seed,
     };
-    let search = Search::new(&setting, options, hooks);
-    let test = search.test(&candidates, &none.base, &evidence);
-    file.mismatch.p_value = finite(test.p_value);
-    // Where the residual is mismatch throughout, the plain sum of squares decides, with as many samples as are independent.
-    let tau = correlation_time(&data.layout, &none.base.fit.residual);
-    let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
-    let plainly = Search::new(&plain, options, hooks);
-    let murky = none.base.gross() || none.base.far();
-    let mut significant = test.p_value < options.alpha;
-    // A slight colour matters where nothing is seen under it.
-    let colour = none.base.coloured() || none.base.driven() || (!significant && none.base.whitener.coefficients() > 0);
-    let heard = murky || (colour && !budget.omits(Step::OtherNoise));
-    let plain_start = if heard { plainly.start(&none) } else { None };
-    let (mut gross, under_white) = if murky { (plain_start, None) } else { (None, plain_start) };
-    let mut pool = Vec::new();
-    // A coloured noise model takes part of a mismatch for noise: what plain squares would find is heard too.
-    if let Some((start, found)) = &under_white {
-        (hooks.progress)("refitting the likeliest effects without a noise model");
-        pool = search.under_noise(&none, &plainly.glance(start, found));
-    }
-    if !significant {
-        (hooks.progress)("taking a second look");
-        let seen = match &gross {
-            Some((start, found)) => plainly.on_blocks(start, &plainly.glance(start, found)),
-            None => {
-                search.glance(&none, &candidates).into_iter().for_each(|h| add(&mut pool, h));
-                search
-                    .by_chance(&none, &pool, candidates.len())
-                    .or_else(|| search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref()))
-            }
-        };
-        if let Some(p) = seen.or_else(|| search.by_terms(&none)) {
-            file.notes.push(format!(
-                "surrogates of the residual do not tell the mismatch from noise (p = {:.3}); effects that were fitted to it do (p = {p:.1e})",
-                test.p_value
-            ));
-            file.mismatch.p_value = finite(p.min(test.p_value));
-            significant = true;
-        }
-    }
-    if !significant {
-        pool.clear();
-    }
-    if significant && let Some((start, found)) = gross.take() {
-        plainly.extend(&start, &found, &mut pool);
-        let sets = search.under_noise(&none, &pool);
-        let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
-        if fine {
-            pool = sets;
-        } else {
-            gross = Some((start, found));
-        }
-    }
-    if significant && gross.is_none() {
-        search.extend(&none, &candidates, &mut pool);
-    }
-    let (setting, search, none) = match gross {
-        Some((start, found)) if significant => {
-            candidates = found;
-            (&plain, &plainly, start)
-        }
-        _ => (&setting, &search, none),
-    };
-    for question in request.questions {
-        (hooks.progress)("weighing what was asked");
-        match search.answer(&none, question)? {
-            Some(h) => add(&mut pool, h),
-            None => file.notes.push(format!("{} could not be fitted", words(question))),
-        }
-    }
-    pool.insert(0, none);
+    file.notes.extend(heard);
     let baseline = pool[0].base.document();
     file.notes.extend(answers(&pool, request.questions));
 
@@ -258,7 +183,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         file.mismatch.noise_rms = by_column(simulation, &noise);
     }
     // Under a noise of its own a simulation may leave more than it has to.
-    let least = under_white.as_ref().map_or(&pool[0], |(start, _)| start);
+    let least = least.as_ref().unwrap_or(&pool[0]);
     let veto = if winner > 0 { veto(best, least, worse_on_blocks(&blocks, winner)) } else { None };
     let vetoed = veto.is_some();
     if let Some(why) = veto {

@@ -21,7 +21,7 @@ use crate::second_look::{ODDS_AGAINST_MORE, SLOW, unlikely};
 use crate::slot::Slot;
 
 /// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
-const WORSE: f64 = 1.05;
+pub const WORSE: f64 = 1.05;
 
 /// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
 pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Base<'d>, DiagnoseError> {
@@ -107,7 +107,7 @@ fn keep_explaining<'d>(none: &Hypothesis<'d>, pool: &mut Vec<Hypothesis<'d>>) {
 /// A search for sets of effects on one calibrated simulation.
 pub struct Search<'a, 'd> {
     /// What all fits share.
-    pub setting: &'a Setting<'d>,
+    pub setting: Setting<'d>,
     /// Level and seed of the tests.
     pub options: Options,
     /// Progress and time.
@@ -122,7 +122,7 @@ pub struct Search<'a, 'd> {
 
 impl<'a, 'd> Search<'a, 'd> {
     /// A search that has found nothing yet.
-    pub fn new(setting: &'a Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
+    pub fn new(setting: Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
         Self { setting, options, hooks, tests: RefCell::default(), screened: RefCell::default(), open: OnceCell::new() }
     }
 
@@ -134,10 +134,10 @@ impl<'a, 'd> Search<'a, 'd> {
         Some((start, candidates))
     }
 
-    /// Adds every set of effects that is fitted: the short list, the numerics, and what composition makes of them and of the sets there are.
-    pub fn extend(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
+    /// Adds the effects that are fitted alone: the short list, its rivals, the numerics.
+    pub fn singles(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
         (self.hooks.progress)("refitting the likeliest effects");
-        for h in refit_all(self.setting, none, &short_list(candidates, SHORT_LIST)) {
+        for h in refit_all(&self.setting, none, &short_list(candidates, SHORT_LIST)) {
             add(pool, h);
         }
         // One hearing may bring another best effect, whose rivals are others.
@@ -148,23 +148,28 @@ impl<'a, 'd> Search<'a, 'd> {
                 break;
             }
             given.extend(list.iter().map(|c| c.key()));
-            for h in refit_all(self.setting, none, &list) {
+            for h in refit_all(&self.setting, none, &list) {
                 add(pool, h);
             }
         }
         if let Some((special, wider)) = outdone_by_a_special_case(pool, candidates)
             && !self.setting.budget.omits(Step::Rivals)
         {
+            let setting = &self.setting;
             let found: Vec<Hypothesis<'d>> =
-                wider.par_iter().filter_map(|c| refit_wider(self.setting, none, c, &pool[special])).collect();
+                wider.par_iter().filter_map(|c| refit_wider(setting, none, c, &pool[special])).collect();
             found.into_iter().for_each(|h| add(pool, h));
         }
         if !self.setting.budget.omits(Step::Numerics)
-            && let Some(h) = crate::numerics_check::artefact(self.setting, none)
+            && let Some(h) = crate::numerics_check::artefact(&self.setting, none)
         {
             add(pool, h);
         }
         keep_explaining(none, pool);
+    }
+
+    /// Adds what composition makes of the sets there are.
+    pub fn combine(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
         (self.hooks.progress)("looking for a second and third effect");
         let unexplained = |h: &Hypothesis<'_>| {
             let test = self.remains(h);
@@ -174,13 +179,14 @@ impl<'a, 'd> Search<'a, 'd> {
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
         let around = |h: &Hypothesis<'d>| self.around(h);
         let hear = Ask { unexplained: &unexplained, around: &around };
-        compose(self.setting, none, candidates, pool, bounds, &hear);
+        compose(&self.setting, none, candidates, pool, bounds, &hear);
         keep_explaining(none, pool);
         self.screened.take();
     }
 
     /// The likeliest of these sets, which were found under another noise model, fitted under this search's.
     pub fn under_noise(&self, none: &Hypothesis<'d>, sets: &[Hypothesis<'d>]) -> Vec<Hypothesis<'d>> {
+        let setting = &self.setting;
         let mut order: Vec<&Hypothesis<'d>> = sets.iter().collect();
         order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         order
@@ -188,12 +194,11 @@ impl<'a, 'd> Search<'a, 'd> {
             .take(MOST_CARRIED)
             .enumerate()
             .filter_map(|(i, h)| {
-                if i > 0 && self.setting.budget.omits(Step::OtherNoise) {
+                if i > 0 && setting.budget.omits(Step::OtherNoise) {
                     return None;
                 }
-                let base = self.setting.further(&h.base, None, 3, self.setting.iterations)?;
-                (base.log_likelihood > none.base.log_likelihood)
-                    .then(|| self.setting.hypothesis(h.effects.clone(), base))
+                let base = setting.further(&h.base, None, 3, setting.iterations)?;
+                (base.log_likelihood > none.base.log_likelihood).then(|| setting.hypothesis(h.effects.clone(), base))
             })
             .collect()
     }
@@ -212,7 +217,7 @@ impl<'a, 'd> Search<'a, 'd> {
             let Some(candidate) = found.first() else {
                 return Err(DiagnoseError::Question(format!("{mechanism}@{slot}")));
             };
-            let Some(h) = refit(self.setting, parent, candidate) else { return Ok(None) };
+            let Some(h) = refit(&self.setting, parent, candidate) else { return Ok(None) };
             set = Some(h);
         }
         Ok(set)

@@ -61,8 +61,8 @@ impl<'d> Search<'_, 'd> {
                 list.push(c);
             }
         }
-        let mut fitted = refit_all(self.setting, start, &list);
-        fitted.extend(superposed(self.setting, start, candidates, LOOKED_AT.1));
+        let mut fitted = refit_all(&self.setting, start, &list);
+        fitted.extend(superposed(&self.setting, start, candidates, LOOKED_AT.1));
         fitted
     }
 
@@ -107,7 +107,7 @@ impl<'d> Search<'_, 'd> {
 
     /// Whether a set predicts blocks that it was not fitted to better than the simulation as it is.
     fn predicts_blocks(&self, start: &Hypothesis<'d>, set: &Hypothesis<'d>) -> bool {
-        let squares = |h| block_score(self.setting, h).map(|(_, squares)| squares.iter().sum::<f64>());
+        let squares = |h| block_score(&self.setting, h).map(|(_, squares)| squares.iter().sum::<f64>());
         matches!((squares(start), squares(set)), (Some(before), Some(after)) if after < before)
     }
 
@@ -133,7 +133,7 @@ impl<'d> Search<'_, 'd> {
             return None;
         }
         (self.hooks.progress)("rehearsing on simulated recordings in which nothing is missing");
-        by_rehearsal(self.setting, none, candidates, plain, level, self.options.seed).filter(|p| *p < level)
+        by_rehearsal(&self.setting, none, candidates, plain, level, self.options.seed).filter(|p| *p < level)
     }
 
     /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.
@@ -152,8 +152,8 @@ impl<'d> Search<'_, 'd> {
         if !large && best.log_evidence - start.log_evidence < SURE {
             return None;
         }
-        let (_, before) = block_score(self.setting, start)?;
-        let (_, after) = block_score(self.setting, best)?;
+        let (_, before) = block_score(&self.setting, start)?;
+        let (_, after) = block_score(&self.setting, best)?;
         let p = (better_by_chance(&before, &after)? * fitted.len() as f64).min(1.0);
         let halved = after.iter().sum::<f64>() < HALF * before.iter().sum::<f64>();
         (p < self.options.alpha || halved).then_some(p)

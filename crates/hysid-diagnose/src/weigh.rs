@@ -262,7 +262,7 @@ pub fn log_weights(
 
 #[cfg(test)]
 #[path = "../tests/common/oscillator.rs"]
-mod oscillator;
+pub(crate) mod oscillator;
 
 #[cfg(test)]
 mod tests {
