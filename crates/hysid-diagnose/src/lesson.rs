@@ -20,6 +20,9 @@ const BETTER: (f64, f64) = (2.0, 0.05);
 /// Log likelihood that the error of integration may cost.
 const ERROR: f64 = 2.0;
 
+/// Times that the likeliest sets take once more of what the whole search took.
+const FITS: f64 = 0.5;
+
 /// How far a search is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Done {
@@ -54,7 +57,7 @@ pub struct Lesson<'d> {
 }
 
 /// What the sets taught that were fitted so far, in this setting of a search that `setting` began with; `None` where the next search would be the
-/// same, or where there is no time for it (which is remembered).
+/// same, or where there is no time for it (which is remembered, as is what a search left out whose time is up already).
 pub fn lesson<'d>(
     setting: &Setting<'d>,
     judged: &Setting<'d>,
@@ -62,6 +65,10 @@ pub fn lesson<'d>(
     pool: &[Hypothesis<'d>],
     done: Done,
 ) -> Option<Lesson<'d>> {
+    let budget = setting.budget;
+    if !budget.affords(0.0) {
+        return None;
+    }
     let mut order: Vec<&Hypothesis<'d>> = pool.iter().filter(|h| !h.effects.is_empty()).collect();
     order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     order.truncate(ASKED);
@@ -73,7 +80,6 @@ pub fn lesson<'d>(
         .filter(|b| b.log_likelihood - none.base.log_likelihood > BETTER.0.max(BETTER.1 * explained));
     let now = setting.substeps;
     let needed = order.iter().map(|h| enough(setting, h)).max().unwrap_or(now);
-    let budget = setting.budget;
     // Half of the time does not depend on the steps.
     let affordable = |steps: usize| budget.affords(done.whole() * (1 + steps) as f64 / (1 + now) as f64);
     let mut substeps = needed;
@@ -81,7 +87,7 @@ pub fn lesson<'d>(
         substeps = (substeps / 2).max(now);
     }
     // A part of the steps is not enough to tell sets apart; the likeliest of them can still be fitted with all.
-    let only_fits = done == Done::Whole && better.is_none() && substeps < needed;
+    let only_fits = done == Done::Whole && better.is_none() && substeps < needed && budget.affords(FITS);
     if only_fits {
         substeps = needed;
     }
@@ -236,7 +242,7 @@ mod tests {
         let after = with(&finely, &start, "sensor_lag");
         assert!(after.base.log_likelihood > pool[0].base.log_likelihood + 5.0 * ERROR && tau(&after) < tau(&pool[0]));
         // Where there is no time for the search, the likeliest sets are fitted once more at its end.
-        let late = |share: f64| share < 0.5;
+        let late = |share: f64| share < 0.4;
         let budget = Budget::new(&late);
         let hurried = Setting { budget: &budget, ..setting.clone() };
         assert!(lesson(&hurried, &hurried, &none, &pool, Done::Whole).is_some_and(|l| l.only_fits));
