@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::base::{Base, spared};
 use crate::budget::Step;
 use crate::data::DataSet;
-use crate::evidence::{Projector, norm2, score};
+use crate::evidence::{Projector, norm2, surprise};
 use crate::fitting::set;
 use crate::hypothesis::{Hypothesis, Setting};
 use crate::random::generator;
@@ -56,10 +56,11 @@ impl<'a> List<'a, '_> {
             .filter_map(|c| {
                 let scored = c.points.iter().filter_map(|p| {
                     let group = p.group.as_ref()?;
-                    Some((score(total, group.explained(&r), r.len(), group.columns.len()), p, group))
+                    let left = (total - group.explained(&r)).max(f64::MIN_POSITIVE);
+                    Some((surprise(0.5 * r.len() as f64 * (total / left).ln(), group.columns.len()), p, group))
                 });
-                let (score, point, group) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
-                Some((score, c, point, group.amplitudes(&r, point.amplitudes.len())))
+                let (surprise, point, group) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+                Some((surprise, c, point, group.amplitudes(&r, point.amplitudes.len())))
             })
             .collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -67,9 +68,9 @@ impl<'a> List<'a, '_> {
     }
 }
 
-/// The largest log evidence that an effect gains on a data set. `handicapped`: what the residual of the recording itself pointed to counts as
-/// one of all the lines there are.
-fn largest_gain(
+/// How surprising the most surprising of the likeliest effects is on a data set, by the log likelihood that it gains. `handicapped`: what the
+/// residual of the recording itself pointed to counts as one of all the lines there are.
+fn largest_surprise(
     setting: &Setting<'_>,
     none: &Base<'_>,
     lists: &[List<'_, '_>],
@@ -84,8 +85,8 @@ fn largest_gain(
             setting.fit(none.model.simulation(), &l.base.values(), noise, ROUNDS + 1, 2 * ITERATIONS)
         })
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
-    let evidence = |b: &Base<'_>| setting.evidence(b) + spared(setting.data, &b.whitener, &start.whitener);
-    let nothing = evidence(&start);
+    let likelihood = |b: &Base<'_>| b.log_likelihood + spared(setting.data, &b.whitener, &start.whitener);
+    let nothing = likelihood(&start);
     let mut best: Option<f64> = None;
     let chosen = lists.iter().flat_map(|l| l.likeliest(residual).into_iter().map(move |c| (&l.base.whitener, c)));
     for (noise, (candidate, point, amplitudes)) in chosen {
@@ -96,8 +97,9 @@ fn largest_gain(
         point.amplitudes.iter().zip(&amplitudes).for_each(|((name, _), x)| set(&mut from, document, name, *x));
         let Some(base) = setting.fit(document, &from, Some(noise), ROUNDS, ITERATIONS) else { continue };
         let lines = if handicapped { lines_of(setting.data, &candidate.refit).ln() } else { 0.0 };
-        let gain = evidence(&base) - nothing - lines;
-        best = Some(best.map_or(gain, |b| b.max(gain)));
+        let unknowns = base.model.unknowns().len().saturating_sub(start.model.unknowns().len());
+        let found = surprise(likelihood(&base) - nothing, unknowns) - lines;
+        best = Some(best.map_or(found, |b| b.max(found)));
     }
     best
 }
@@ -146,7 +148,7 @@ pub fn by_rehearsal(
     let around = |base, candidates| List { base, own: Base::evidence(base).0, candidates };
     let mut lists = vec![around(&none.base, candidates)];
     lists.extend(plain.map(|(start, found)| around(&start.base, found)));
-    let gain = largest_gain(setting, &none.base, &lists, &none.base.fit.residual, true).filter(|g| *g > 0.0)?;
+    let gain = largest_surprise(setting, &none.base, &lists, &none.base.fit.residual, true).filter(|g| *g > 0.0)?;
     let answer = none.base.model.predict(&none.base.fit.theta)?;
     let white = none.base.whitener.apply(&setting.data.layout, &none.base.fit.residual);
     let mut gains: Vec<f64> = Vec::new();
@@ -160,7 +162,7 @@ pub fn by_rehearsal(
             .into_par_iter()
             .filter_map(|index| {
                 let (data, noise) = rehearsed(&none.base, &answer, &white, seed, index);
-                largest_gain(&Setting { data: &data, ..setting.clone() }, &none.base, &lists, &noise, false)
+                largest_surprise(&Setting { data: &data, ..setting.clone() }, &none.base, &lists, &noise, false)
             })
             .collect();
         if drawn.len() < TOGETHER {

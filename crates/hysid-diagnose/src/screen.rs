@@ -18,8 +18,16 @@ use crate::slot::{Slot, Structure};
 
 /// Points of a candidate whose columns are kept for pairs.
 pub const JOINT: usize = 2;
+/// Points of a candidate whose columns take part in the mismatch test: at least, and at most as the rows allow (the columns are held in memory).
+/// A resonance between two of a few points shows in none of them.
+const KEPT: (usize, usize) = (6, 24);
+/// Rows in all points of a candidate together.
+const KEPT_ROWS: usize = 200_000;
+
 /// Points of a candidate whose columns take part in the mismatch test.
-pub const KEPT: usize = 6;
+fn kept(rows: usize) -> usize {
+    (KEPT_ROWS / rows.max(1)).clamp(KEPT.0, KEPT.1)
+}
 
 /// Points of a shape grid that are simulated together.
 const TOGETHER: usize = 8;
@@ -29,7 +37,7 @@ const TOGETHER: usize = 8;
 pub struct Point {
     /// The shapes.
     pub shapes: Vec<(String, f64)>,
-    /// Its columns in the evidence space; kept for a spread of at most [`KEPT`] points, chosen without looking at the residual.
+    /// Its columns in the evidence space; kept for a spread of points ([`kept`] at most), chosen without looking at the residual.
     pub group: Option<FeatureGroup>,
     /// Its columns, kept for the best points that are no neighbours: pairs of candidates are judged by them.
     pub joint: Option<FeatureGroup>,
@@ -240,7 +248,7 @@ fn features(
     for &p in &places {
         theta[p] = 0.0;
     }
-    let every = starts.len().div_ceil(KEPT);
+    let every = starts.len().div_ceil(kept(data.rows()));
     let together = starts.chunks(TOGETHER).flat_map(|some| model.tangents_with(&theta, &places, some));
     for (i, (shapes, tangents)) in starts.iter().zip(together).enumerate() {
         let Some((_, columns)) = tangents else { continue };

@@ -27,5 +27,5 @@ pub use layout::{Layout, Series, Whitener};
 pub use noise::NoiseModel;
 pub use projector::{Projector, dot, norm2};
 pub use response::ForcePath;
-pub use score::{FeatureGroup, detectable_amplitude, score};
+pub use score::{FeatureGroup, detectable_amplitude, score, surprise};
 pub use surrogate::{Contender, SurrogateTest, TestOptions, correlation_time, surrogate_test};

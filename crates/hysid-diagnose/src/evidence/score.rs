@@ -1,7 +1,12 @@
 //! The score of an effect: how much of the residual its response explains that the simulation's own parameters cannot.
 
+use statrs::function::gamma::{gamma_ur, ln_gamma};
+
 use super::layout::{Layout, Whitener};
 use super::projector::{Projector, dot, norm2};
+
+/// Below this the tail of the chi-square law is taken from its asymptotic series.
+const LEAST_TAIL: f64 = 1e-200;
 
 /// The response of one effect at one shape: whitened, projected, orthonormalised.
 #[derive(Debug, Clone)]
@@ -86,6 +91,23 @@ pub fn score(total: f64, explained: f64, rows: usize, columns: usize) -> f64 {
     n * (total.max(f64::MIN_POSITIVE) / left).ln() - columns as f64 * n.ln()
 }
 
+/// `-ln P(chi^2_k > 2 gain)`: how surprising it is that `unknowns` which stand for nothing gain so much log likelihood (Wilks).
+///
+/// A price of `ln n / 2` for each of them compares an effect with none; where what chance does is simulated, that price would hide laws of three
+/// unknowns behind those of one.
+pub fn surprise(gain: f64, unknowns: usize) -> f64 {
+    if gain.is_nan() || gain <= 0.0 || unknowns == 0 {
+        return 0.0;
+    }
+    let half = 0.5 * unknowns as f64;
+    let tail = gamma_ur(half, gain);
+    if tail > LEAST_TAIL {
+        return -tail.ln();
+    }
+    // The first terms of the asymptotic series of the incomplete gamma function.
+    gain - (half - 1.0) * gain.ln() + ln_gamma(half) - ((half - 1.0) / gain).ln_1p()
+}
+
 /// The smallest amplitude that this record would have shown (5 % false alarms over `candidates` effects, 90 % power), in the
 /// amplitude's own unit: `(2.8 + sqrt(2 ln candidates)) / norm`, for a whitened noise of unit variance.
 pub fn detectable_amplitude(group: &FeatureGroup, noise: f64, candidates: usize) -> f64 {
@@ -115,6 +137,27 @@ mod tests {
         let a = two.amplitudes(&[0.0, 2.0 * 3.0 - 1.0, 3.0 - 3.0, -0.5], 2);
         assert!((a[0] - 3.0).abs() < 1e-12 && (a[1] + 1.0).abs() < 1e-12, "{a:?}");
         assert!(FeatureGroup::new(&[vec![3.0, 0.0, 0.0, 0.0]], &layout, &w, &own).is_none());
+    }
+
+    #[test]
+    fn surprise_is_the_tail_of_the_chi_square_law_and_grows_on_where_that_underflows() {
+        // For two unknowns the tail is exp(-gain); for one, 5 % lie beyond 3.8415 and 0.1 % beyond 10.828; for three 1 % beyond 11.345.
+        for gain in [0.3, 7.0, 90.0, 600.0] {
+            assert!((surprise(gain, 2) - gain).abs() < 1e-9 * gain.max(1.0), "{gain}");
+        }
+        for (twice, unknowns, tail) in [(3.8415, 1, 0.05_f64), (10.828, 1, 1e-3), (11.345, 3, 0.01)] {
+            assert!((surprise(0.5 * twice, unknowns) + tail.ln()).abs() < 1e-3);
+        }
+        for unknowns in 1..12 {
+            let mut last = 0.0;
+            for gain in (1..2000).map(|i| 0.5 * f64::from(i)) {
+                let s = surprise(gain, unknowns);
+                assert!(s >= last && surprise(gain, unknowns + 1) <= s, "{gain} {unknowns}: {s} after {last}");
+                assert!(s - last < 0.55 + 0.5 / gain, "{gain} {unknowns}: {s} after {last}");
+                last = s;
+            }
+        }
+        assert_eq!((surprise(-1.0, 2), surprise(f64::NAN, 2), surprise(3.0, 0)), (0.0, 0.0, 0.0));
     }
 
     #[test]
