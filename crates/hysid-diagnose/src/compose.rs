@@ -104,6 +104,8 @@ pub struct Ask<'a, 'd> {
     pub unexplained: &'a dyn Fn(&Hypothesis<'d>) -> bool,
     /// What could be missing around a hypothesis.
     pub around: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
+    /// Effects that its noise model may have taken for noise.
+    pub absorbed: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
 }
 
 /// Log evidence that another effect must add.
@@ -159,27 +161,32 @@ pub fn compose<'d>(
     options: SearchOptions,
     ask: &Ask<'_, 'd>,
 ) {
-    let Ask { unexplained, around } = ask;
+    let Ask { unexplained, around, absorbed } = ask;
     let enough = || setting.budget.omits(Step::Composition);
     for depth in 2..=options.depth {
         if enough() {
             return;
         }
-        // Where nothing significant is left there is nothing to add.
-        if best_below(pool, depth).is_none_or(|b| pool[b].effects.len() + 1 < depth || !unexplained(&pool[b])) {
-            break;
-        }
-        let best = best_below(pool, depth).map_or(f64::NEG_INFINITY, |b| pool[b].log_evidence);
+        // Where nothing significant is left there is nothing to add but what the noise model holds.
+        let Some(standing) = best_below(pool, depth).filter(|&b| pool[b].effects.len() + 1 >= depth) else { break };
+        let more = unexplained(&pool[standing]);
+        let best = pool[standing].log_evidence;
         let parents = beam(pool, depth - 1, options.beam);
         let mut found = Vec::new();
-        if depth == 2 {
+        if more && depth == 2 {
             found.extend(superposed(setting, none, candidates, options.most));
         }
         for p in parents {
             if enough() {
                 break;
             }
-            found.extend(extended(setting, &pool[p], &around(&pool[p]), options, None));
+            if more {
+                found.extend(extended(setting, &pool[p], &around(&pool[p]), options, None));
+            }
+            found.extend(refit_all(setting, &pool[p], &absorbed(&pool[p]).iter().collect::<Vec<_>>()));
+        }
+        if found.is_empty() {
+            break;
         }
         let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
         for h in found {

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::base::Base;
+use crate::base::{Base, NoiseKind};
 use crate::budget::Step;
 use crate::compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short_list, unheard};
 use crate::error::DiagnoseError;
 use crate::evidence::{Contender, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::fitting::{refit, refit_all, refit_wider};
 use crate::hypothesis::{Hypothesis, Key, Setting};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Family, Mechanism};
 use crate::model::{Model, Values};
 use crate::openset::{OpenSet, correction};
 use crate::pipeline::{Hooks, Options, Question, Request};
@@ -65,6 +65,9 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
 const STOP_LEVEL: f64 = 0.02;
 /// Sets that are carried from one noise model to another.
 const MOST_CARRIED: usize = 8;
+/// Iterations by plain squares before what a noise model may have absorbed is looked at, and how many effects of that kind are fitted.
+const PLAIN_ITERATIONS: usize = 5;
+const MOST_ABSORBED: usize = 3;
 /// Composition goes on too while a candidate scores this much around a hypothesis: surrogates of a residual that is mostly mismatch score as
 /// high as the mismatch itself, and their p-value says nothing.
 const STOP_SCORE: f64 = 25.0;
@@ -140,6 +143,11 @@ impl<'a, 'd> Search<'a, 'd> {
         for h in refit_all(&self.setting, none, &short_list(candidates, SHORT_LIST)) {
             add(pool, h);
         }
+        // A drift with an offset is neither of them alone, and both lose to what bends the parameters.
+        let beside = |h: &Hypothesis<'d>| refit_all(&self.setting, h, &self.absorbed(h).iter().collect::<Vec<_>>());
+        let mut absorbed = beside(none);
+        absorbed.extend(absorbed.first().map(beside).unwrap_or_default());
+        absorbed.into_iter().for_each(|h| add(pool, h));
         // One hearing may bring another best effect, whose rivals are others.
         let mut given: Vec<Key> = Vec::new();
         for _ in 0..HEARINGS {
@@ -178,7 +186,8 @@ impl<'a, 'd> Search<'a, 'd> {
         };
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
         let around = |h: &Hypothesis<'d>| self.around(h);
-        let hear = Ask { unexplained: &unexplained, around: &around };
+        let absorbed = |h: &Hypothesis<'d>| self.absorbed(h);
+        let hear = Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed };
         compose(&self.setting, none, candidates, pool, bounds, &hear);
         keep_explaining(none, pool);
         self.screened.take();
@@ -249,6 +258,22 @@ impl<'a, 'd> Search<'a, 'd> {
             Some((key, found)) if key == fitted_key(h) => found,
             _ => screen(&h.base, &self.setting.original, &h.effects, &h.base.evidence(), &|_, _| true),
         }
+    }
+
+    /// Offsets, drifts and lines that plain squares see around a hypothesis: a noise that rises towards low frequency holds the ones, an autoregression
+    /// predicts the others, and under it their scores are nothing. Fitted beside the effects, each with a noise model of its own, the evidence tells
+    /// which it is.
+    fn absorbed(&self, h: &Hypothesis<'d>) -> Vec<Candidate> {
+        if h.base.whitener.coefficients() == 0 || self.setting.budget.omits(Step::OtherNoise) {
+            return Vec::new();
+        }
+        let plain = Setting { noise: NoiseKind::White(1.0), ..self.setting.clone() };
+        let Some(base) = plain.further(&h.base, None, 1, PLAIN_ITERATIONS) else { return Vec::new() };
+        let like_noise = |m: &Mechanism, _: &Slot| m.family.is_slow_noise() || m.family == Family::ExternalDisturbance;
+        let mut found = screen(&base, &self.setting.original, &h.effects, &base.evidence(), &like_noise);
+        found.retain(|c| c.score() > STOP_SCORE);
+        found.truncate(MOST_ABSORBED);
+        found
     }
 
     /// The mismatch test over all candidates' kept columns. Where the noise has a colour, what slow noise does has a handicap.
