@@ -36,6 +36,8 @@ pub enum Step {
     Remains,
     /// The search once more, from better parameters or with shorter steps.
     Again,
+    /// A written correction without each of its terms; the verdict does not rest on it.
+    Terms,
     /// The experiment; the verdict does not rest on it.
     Experiment,
 }
@@ -53,6 +55,7 @@ impl Step {
             Self::Blocks => "rivals on held-out blocks",
             Self::Remains => "the test of what remains",
             Self::Again => "the search once more, from better parameters or with shorter steps",
+            Self::Terms => "whether each term of the correction is needed",
             Self::Experiment => "an experiment",
         }
     }
@@ -80,7 +83,7 @@ impl<'a> Budget<'a> {
     pub fn omits(&self, step: Step) -> bool {
         let share = match step {
             Step::Remains | Step::Drops => TESTS,
-            Step::Blocks | Step::Experiment => WHOLE,
+            Step::Blocks | Step::Terms | Step::Experiment => WHOLE,
             _ => SEARCH,
         };
         let late = (self.expired)(share);
@@ -106,7 +109,7 @@ impl<'a> Budget<'a> {
 
     /// Whether something was left out on which the verdict rests.
     pub fn unfinished(&self) -> bool {
-        self.list().iter().any(|step| *step != Step::Experiment)
+        self.list().iter().any(|step| !matches!(step, Step::Terms | Step::Experiment))
     }
 
     fn list(&self) -> Vec<Step> {

@@ -7,7 +7,7 @@ use crate::file::finite;
 use crate::file::{CorrectionRecord, RemainingRecord};
 use crate::firmness::is_a_spectrum;
 use crate::hypothesis::{Hypothesis, block_score};
-use crate::openset::OpenSet;
+use crate::openset::{OpenSet, fitted};
 use crate::records::noise_floor;
 use crate::search::Search;
 use crate::second_look::{ODDS_AGAINST, ODDS_AGAINST_MORE, unlikely};
@@ -84,7 +84,8 @@ impl Left {
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
-    /// evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool).
+    /// evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool):
+    /// three or four blocks tell little of a mismatch far below the noise, so they need not rule out chance where the evidence does.
     pub fn modelled<'d>(
         &self,
         search: &Search<'_, 'd>,
@@ -93,7 +94,7 @@ impl Left {
         otherwise: usize,
     ) -> Option<Hypothesis<'d>> {
         // Where a parameter walks, another recording sees another walk: functions of the time that follow this one are no use there.
-        if self.told().is_some_and(|o| o.words.is_some() && o.written.is_none()) {
+        if self.told().is_some_and(|o| o.words.is_some() && o.writable.is_none()) {
             return None;
         }
         let setting = &search.setting;
@@ -101,16 +102,15 @@ impl Left {
         let best = [(winner, self.open.as_ref()), (0, instead.as_ref())]
             .into_iter()
             .filter_map(|(i, open)| {
-                let parent = &pool[i];
-                let written = open?.written.as_ref()?;
-                let base =
-                    setting.fit(written, &parent.base.values(), Some(&parent.base.whitener), 2, setting.iterations)?;
-                Some(setting.hypothesis(parent.effects.clone(), base))
+                let (parent, open) = (&pool[i], open?);
+                Some((fitted(setting, parent, open.writable.as_ref()?)?, self.stands_by_evidence(open)))
             })
-            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+            .max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))?;
+        let (best, sure) = best;
         let (_, before) = block_score(setting, &pool[otherwise])?;
         let (_, after) = block_score(setting, &best)?;
-        (better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
+        let better = after.iter().sum::<f64>() < before.iter().sum::<f64>();
+        ((sure && better) || better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
     }
 
     /// The correction that is told: in place of the set, or of what it leaves.
@@ -121,7 +121,12 @@ impl Left {
     /// Whether a correction is beyond doubt: on blocks that it was not fitted to, or by evidence that noise has nowhere. A mismatch far below the
     /// noise never shows on blocks.
     fn stands(&self, open: &OpenSet) -> bool {
-        open.block_ratio < BETTER || unlikely(open, ODDS_AGAINST) < self.alpha
+        open.block_ratio < BETTER || self.stands_by_evidence(open)
+    }
+
+    /// Whether a correction gains more evidence than noise has anywhere, and helps on blocks.
+    fn stands_by_evidence(&self, open: &OpenSet) -> bool {
+        unlikely(open, ODDS_AGAINST) < self.alpha
     }
 
     /// The correction, where it models something that is left and helps where it was not fitted, with what it says in words.

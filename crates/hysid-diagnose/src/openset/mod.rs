@@ -11,6 +11,7 @@
 
 mod course;
 mod modulation;
+mod needed;
 mod signature;
 mod terms;
 mod varying;
@@ -24,10 +25,11 @@ use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use crate::data::held_out_blocks;
 use crate::evidence::{Projector, Whitener, dot, norm2};
 use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
+pub use needed::fitted;
 use signature::signature;
 use terms::{Kind, Term, terms};
 use varying::{Varying, varying};
-use written::{with_oscillation, with_terms};
+use written::{Sparse, with_oscillation};
 
 /// A correction with what decides whether it is believed.
 #[derive(Debug, Clone)]
@@ -38,11 +40,20 @@ pub struct OpenSet {
     pub block_ratio: f64,
     /// Log evidence that it adds: its terms pay for their coefficients, and for having been chosen out of many.
     pub gain: f64,
-    /// The fitted simulation with the terms in it, not yet refitted; `None` where a term cannot be written, where a parameter walks, or where a term is a function of the time
+    /// The fitted simulation with the correction in it, not yet refitted; `None` where a parameter walks, or where a term is a function of the time
     /// in this recording beside others that are not: such a term mends what the others miss, and says nothing of another recording.
-    pub written: Option<Simulation>,
+    pub writable: Option<Writable>,
     /// What it says in words, where it says more than that something is missing.
     pub words: Option<String>,
+}
+
+/// A correction that can be written into a simulation.
+#[derive(Debug, Clone)]
+pub enum Writable {
+    /// Generic terms.
+    Sparse(Sparse),
+    /// The simulation with a parameter that oscillates.
+    Oscillation(Simulation),
 }
 
 /// Most terms of a correction.
@@ -106,14 +117,17 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
     let slot = terms[best.terms[0]].slot.clone();
     let signature = signature(base, terms, &best.left, &best.terms, &best.coefficients);
     let timed = best.terms.iter().filter(|&&i| terms[i].kind == Kind::Time).count();
-    let with_coefficients = best.terms.iter().map(|&i| &terms[i]).zip(best.coefficients.iter().copied());
-    let written =
-        if timed == 0 || timed == best.terms.len() { with_terms(&base.document(), with_coefficients) } else { None };
+    let with_coefficients = || {
+        let bare = |i: usize| Term { column: Vec::new(), ..terms[i].clone() };
+        best.terms.iter().map(move |&i| bare(i)).zip(best.coefficients.iter().copied())
+    };
+    let whole = timed == 0 || timed == best.terms.len();
+    let writable = whole.then(|| Writable::Sparse(Sparse::new(base.document(), with_coefficients())));
     OpenSet {
         record: CorrectionRecord { slot, terms: records, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &best.left, 0.0),
         gain: best.gain,
-        written,
+        writable,
         words: None,
     }
 }
@@ -139,7 +153,7 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         record: CorrectionRecord { slot: format!("{place}:{}", found.symbol), terms: records, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),
         gain: found.gain,
-        written: with_oscillation(&base.document(), &found),
+        writable: with_oscillation(&base.document(), &found).map(Writable::Oscillation),
         words: Some(found.words()),
     }
 }

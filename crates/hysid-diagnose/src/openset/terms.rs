@@ -21,9 +21,20 @@ struct Signal {
     slot: String,
     side: &'static str,
     text: String,
-    coordinates: Arc<[(String, Expr)]>,
+    coordinates: Arc<[Coordinate]>,
     kind: Kind,
     series: Series,
+}
+
+/// A coordinate of generic terms.
+#[derive(Debug, Clone)]
+pub struct Coordinate {
+    /// As it is called in a term's text.
+    pub name: String,
+    /// What it stands for in the simulation.
+    pub meaning: Expr,
+    /// The same, held at the ends of the range that was seen of it.
+    pub held: Expr,
 }
 
 /// What a generic term is a function of.
@@ -42,11 +53,12 @@ pub enum Kind {
 }
 
 /// One generic signal at one place.
+#[derive(Debug, Clone)]
 pub struct Term {
     /// As it is written.
     pub text: String,
-    /// What the coordinates in the text stand for in the simulation, held at the ends of the range that was seen of them.
-    pub coordinates: Arc<[(String, Expr)]>,
+    /// What its text is written over.
+    pub coordinates: Arc<[Coordinate]>,
     /// Where it enters the equations.
     pub place: Place,
     /// What it is a function of.
@@ -261,9 +273,15 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let Some(mut series) = along(base, &expressions) else { continue };
         let inputs: Vec<(&str, Series)> =
             inputs.iter().map(|u| u.symbol.as_str()).zip(series.split_off(coordinates.len())).collect();
-        // Beyond what was seen of a coordinate a term says nothing: there it stays as it is at the end of the range.
-        let within: Arc<[(String, Expr)]> =
-            coordinates.iter().zip(&series).map(|(c, x)| (c.0.clone(), held_beyond(c.1.clone(), x))).collect();
+        let within: Arc<[Coordinate]> = coordinates
+            .iter()
+            .zip(&series)
+            .map(|((name, meaning, _), x)| Coordinate {
+                name: name.clone(),
+                meaning: meaning.clone(),
+                held: held_beyond(meaning.clone(), x),
+            })
+            .collect();
         let mut found: Vec<(String, Kind, Series)> = Vec::new();
         for ((name, _, velocity), x) in coordinates.iter().zip(&series) {
             found.extend(shapes(name, x, *velocity));

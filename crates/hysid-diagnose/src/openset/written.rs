@@ -5,11 +5,11 @@
 
 use std::f64::consts::TAU;
 
-use hysid_plant::{Expr, Parameter, Simulation, Slot as Place};
+use hysid_plant::{BinaryOp, Expr, Function, Parameter, Simulation, Slot as Place};
 
 use super::course::{Course, phases};
 use super::modulation::multiply;
-use super::terms::Term;
+use super::terms::{Coordinate, Term};
 use super::varying::Varying;
 
 /// How far a coefficient may move from where the regression on the tangent found it, over its own size.
@@ -19,16 +19,71 @@ const SHAPES: (f64, f64) = (0.5, 2.0);
 /// Numbers that are part of a term's form.
 const FORM: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 
-/// A simulation with these terms, each with its coefficient, where they act; `None` where a term cannot be written over its symbols.
-pub fn with_terms<'t>(simulation: &Simulation, terms: impl IntoIterator<Item = (&'t Term, f64)>) -> Option<Simulation> {
+/// Terms with their coefficients, each of which a simulation can go without.
+#[derive(Debug, Clone)]
+pub struct Sparse {
+    simulation: Simulation,
+    members: Vec<Member>,
+}
+
+/// A term with its coefficient on the tangent, and where its own parameters were fitted to: the coefficient, then its shapes.
+#[derive(Debug, Clone)]
+struct Member {
+    term: Term,
+    coefficient: f64,
+    fitted: Vec<f64>,
+}
+
+impl Sparse {
+    /// In this simulation.
+    pub fn new(simulation: Simulation, terms: impl Iterator<Item = (Term, f64)>) -> Self {
+        let members = terms.map(|(term, coefficient)| Member { term, coefficient, fitted: Vec::new() }).collect();
+        Self { simulation, members }
+    }
+
+    /// The simulation with them, and the names of each one's parameters: its coefficient, then its shapes.
+    pub fn written(&self) -> Option<(Simulation, Vec<Vec<String>>)> {
+        let (mut simulation, names) =
+            with_terms(&self.simulation, self.members.iter().map(|m| (&m.term, m.coefficient)))?;
+        for (name, value) in names.iter().zip(&self.members).flat_map(|(names, m)| names.iter().zip(&m.fitted)) {
+            simulation.parameter_mut(name)?.value = *value;
+        }
+        Some((simulation, names))
+    }
+
+    /// Without one of them, the others as they were fitted; `None` where it is the only one.
+    pub fn without(&self, place: usize, fitted: &[Vec<f64>]) -> Option<Self> {
+        let kept = self.members.iter().zip(fitted).enumerate().filter(|(i, _)| *i != place);
+        let members: Vec<Member> = kept.map(|(_, (m, f))| Member { fitted: f.clone(), ..m.clone() }).collect();
+        (!members.is_empty()).then(|| Self { simulation: self.simulation.clone(), members })
+    }
+}
+
+/// A simulation with these terms where they act, and the names of each one's parameters, its coefficient first; `None` where a term cannot be written over its symbols.
+pub fn with_terms<'t>(
+    simulation: &Simulation,
+    terms: impl IntoIterator<Item = (&'t Term, f64)>,
+) -> Option<(Simulation, Vec<Vec<String>>)> {
+    let terms: Vec<(&Term, f64)> = terms.into_iter().collect();
+    // Beyond what was seen of a coordinate a curve says nothing: there it stays as it is at the end of the range, and with it what it balances
+    // within. Proportions and waves go on.
+    let mut curves: Vec<&Expr> = Vec::new();
+    for (term, _) in &terms {
+        let text = Expr::parse(&term.text).ok()?;
+        curves.extend(term.coordinates.iter().filter(|c| degree(&text, &c.name) > 1).map(|c| &c.meaning));
+    }
+    let mut names = Vec::new();
     let mut written = simulation.clone();
     // What is added to an input stands for the input as it was: all of its terms enter at once.
     let mut inputs: Vec<Option<Expr>> = vec![None; simulation.inputs.len()];
-    for (term, coefficient) in terms {
+    for (term, coefficient) in &terms {
         let name = written.fresh_symbol("g");
         let reach = REACH * coefficient.abs();
-        written.parameters.push(Parameter::new(&name, coefficient).within(coefficient - reach, coefficient + reach));
-        let part = Expr::symbol(&name) * with_free_shapes(&mut written, term)?;
+        written.parameters.push(Parameter::new(&name, *coefficient).within(coefficient - reach, coefficient + reach));
+        let before = written.parameters.len();
+        let part = Expr::symbol(&name) * with_free_shapes(&mut written, term, &curves)?;
+        let shapes = written.parameters[before..].iter().map(|p| p.name.clone());
+        names.push(std::iter::once(name).chain(shapes).collect());
         match term.place {
             Place::State(i) => {
                 let state = written.states.get_mut(i)?;
@@ -49,7 +104,7 @@ pub fn with_terms<'t>(simulation: &Simulation, terms: impl IntoIterator<Item = (
             written.map_equations(|e| e.substitute(&input.symbol, &sum));
         }
     }
-    Some(written)
+    Some((written, names))
 }
 
 /// Share of a cycle over the recording by which a frequency may move from where the periodogram found it.
@@ -75,7 +130,8 @@ pub fn with_oscillation(simulation: &Simulation, found: &Varying) -> Option<Simu
 }
 
 /// A term over the simulation's symbols, the numbers in it parameters; exponents, zero and one are part of its form.
-fn with_free_shapes(simulation: &mut Simulation, term: &Term) -> Option<Expr> {
+/// `curves`: coordinates that are held at the ends of what was seen of them.
+fn with_free_shapes(simulation: &mut Simulation, term: &Term, curves: &[&Expr]) -> Option<Expr> {
     let parsed = Expr::parse(&term.text).ok()?;
     let free = parsed.map(&mut |e| match e {
         Expr::Number(n) if !FORM.contains(&n) => {
@@ -86,7 +142,26 @@ fn with_free_shapes(simulation: &mut Simulation, term: &Term) -> Option<Expr> {
         }
         other => other,
     });
-    Some(term.coordinates.iter().fold(free, |e, (name, meaning)| e.substitute(name, meaning)))
+    let meaning = |c: &Coordinate| if curves.contains(&&c.meaning) { c.held.clone() } else { c.meaning.clone() };
+    Some(term.coordinates.iter().fold(free, |e, c| e.substitute(&c.name, &meaning(c))))
+}
+
+/// Degree at which an expression grows with a symbol: 0 where it stays bounded or repeats itself, 1 in proportion, 2 where it curves.
+fn degree(e: &Expr, symbol: &str) -> usize {
+    let of = |e: &Expr| degree(e, symbol);
+    let most = |all: &[Expr]| all.iter().map(of).max().unwrap_or(0);
+    match e {
+        Expr::Number(_) => 0,
+        Expr::Symbol(name) => usize::from(name == symbol),
+        Expr::Neg(a) => of(a),
+        Expr::Binary(BinaryOp::Add | BinaryOp::Sub, a, b) => of(a).max(of(b)),
+        Expr::Binary(BinaryOp::Mul, a, b) => of(a) + of(b),
+        Expr::Binary(BinaryOp::Div, a, b) if of(b) == 0 => of(a),
+        Expr::Call(Function::Sign | Function::Sin | Function::Cos, _) => 0,
+        Expr::Call(Function::Abs | Function::Min | Function::Max, all) | Expr::Memory(_, all) => most(all),
+        Expr::Binary(_, a, b) => 2 * of(a).max(of(b)),
+        Expr::Call(_, all) => 2 * most(all),
+    }
 }
 
 #[cfg(test)]
@@ -105,6 +180,19 @@ mod tests {
     use crate::model::{Model, Values};
     use crate::openset::terms::terms;
     use crate::refit::LmOptions;
+
+    #[test]
+    fn a_term_grows_in_proportion_to_a_coordinate_or_curves() {
+        let x = |text: &str| degree(&Expr::parse(text).unwrap(), "x");
+        for proportion in ["abs(u)*x", "x*abs(v)", "abs(x)*sign(v)", "max(-0.2 - x, 0)", "play(x, 0.3)", "t*x", "v^2*x"]
+        {
+            assert_eq!(x(proportion), 1, "{proportion}");
+        }
+        for curve in ["x^2", "abs(x)*x", "x^2*v", "tanh(x/0.1)", "sign(x)*sqrt(abs(x))"] {
+            assert!(x(curve) > 1, "{curve}");
+        }
+        assert_eq!((x("u*v"), x("sign(x)*v"), x("v*cos(3*x)")), (0, 0, 0));
+    }
 
     /// What regression on the tangent saw and what is written and refitted must be the same term: its response is the derivative of the
     /// written simulation by its coefficient, for each of the terms at every slot.
@@ -132,7 +220,7 @@ mod tests {
         assert!(all.len() > 50, "{}", all.len());
         for term in &all {
             let response = |g: f64| {
-                let mut written = with_terms(&base.document(), [(term, 1.0)]).unwrap();
+                let (mut written, _) = with_terms(&base.document(), [(term, 1.0)]).unwrap();
                 written.parameter_mut("g").unwrap().value = g;
                 let m = model(&written);
                 let theta = m.theta(&start);
