@@ -304,8 +304,50 @@ pub fn words(question: &Question) -> String {
 }
 
 #[cfg(test)]
+#[path = "../tests/common/oscillator.rs"]
+mod oscillator;
+
+#[cfg(test)]
 mod tests {
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
+    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
+    use crate::budget::Budget;
+    use crate::data::DataSet;
+    use crate::hypothesis::calibrated;
+
+    /// What may have been absorbed, and the largest score of the same under the noise model's own eyes, where this is added to an oscillator's
+    /// output, in multiples of white noise, by the time in seconds.
+    fn absorbed(added: impl Fn(f64) -> f64) -> (Vec<&'static str>, Option<f64>) {
+        let mut random = normal(5);
+        let u = drive(1000, &mut random);
+        let mut y = respond(&u, REAL, |_, _| 0.0);
+        let noise = 0.005 * rms(&y);
+        y.iter_mut().enumerate().for_each(|(i, y)| *y += noise * (added(i as f64 * PERIOD) + random()));
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
+        let search = Search::new(setting, Options::default(), &hooks);
+        let found: Vec<&str> = search.absorbed(&none).iter().map(|c| c.mechanism.id).collect();
+        let own = search.around(&none).iter().find(|c| found.first() == Some(&c.mechanism.id)).map(Candidate::score);
+        (found, own)
+    }
+
+    #[test]
+    fn what_a_noise_model_takes_for_noise_is_seen_by_plain_squares() {
+        let (nothing, _) = absorbed(|_| 0.0);
+        assert!(nothing.is_empty(), "{nothing:?}");
+        let (line, own) = absorbed(|t| 3.0 * (31.0 * t).sin());
+        assert!(line.first() == Some(&"periodic_disturbance") && own.unwrap() < 0.0, "{line:?} {own:?}");
+        let (slow, own) = absorbed(|t| 1.0 + 0.5 * (0.2 * t).sin());
+        assert!(slow.iter().any(|m| m.ends_with("_offset")) && own.unwrap() < STOP_SCORE, "{slow:?} {own:?}");
+    }
 
     #[test]
     fn a_set_that_leaves_what_a_smaller_one_explains_has_given_up() {
