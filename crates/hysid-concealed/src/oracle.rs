@@ -8,8 +8,12 @@
 //!
 //! Told beforehand and not estimated: what lays out a path or a grid (times, widths of plays, the bit of a converter, see `refit`).
 
+use std::time::{Duration, Instant};
+
 use crate::machine::Machine;
-use crate::refit::{Factor, Fit, Knob, Refit, Scope, Target, gauss_newton, jacobian, knobs, moved, normal_equations};
+use crate::refit::{
+    Factor, Fit, Knob, Refit, Scope, Target, gauss_newton, jacobian, knobs, late, moved, normal_equations,
+};
 use crate::seed::{Random, Stream};
 
 /// Starts beside the truth, and their distance from it (standard deviation, relative).
@@ -23,13 +27,30 @@ const AGREED: f64 = 0.01;
 /// Steps of the polish in standard errors.
 const POLISH: [f64; 3] = [1.0, 0.5, 0.25];
 
+/// The estimate, and whether the search for it came to its end.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// The best fit that was found.
+    pub refit: Refit,
+    /// The patience sufficed. Where it did not, the fit is the best so far; it starts at the truth, so that its error may be too small, never
+    /// that of a search gone astray.
+    pub complete: bool,
+}
+
 /// Estimates the parameters of plant and effects of `truth` from a recording; channel `c` is divided by `scale[c]`. `None` where the true
 /// machine cannot be run.
-pub fn oracle(truth: &Machine, target: Target, scale: &[f64]) -> Option<Refit> {
+///
+/// A stiff law over a long recording costs seconds a simulation, and the search hundreds of them: past `patience` it ends with what it has.
+pub fn oracle(truth: &Machine, target: Target, scale: &[f64], patience: Duration) -> Option<Estimate> {
+    let deadline = Instant::now().checked_add(patience);
     let knobs = knobs(truth, Scope::Effects, false, target);
     let from = |start: Machine, steps: &[(f64, usize)]| {
         let start = Fit::of(start, target, scale)?;
-        Some(steps.iter().fold(start, |fit, &(step, rounds)| gauss_newton(fit, &knobs, target, scale, step, rounds)))
+        Some(
+            steps
+                .iter()
+                .fold(start, |fit, &(step, rounds)| gauss_newton(fit, &knobs, target, scale, step, rounds, deadline)),
+        )
     };
     let mut best = from(truth.clone(), &[(1e-4, 12)])?;
     // The same starts for every case: no stream of the bank is touched.
@@ -42,16 +63,17 @@ pub fn oracle(truth: &Machine, target: Target, scale: &[f64]) -> Option<Refit> {
             best = found;
         }
         if agreed {
-            return Some(best.refit());
+            return Some(Estimate { refit: best.refit(), complete: !late(deadline) });
         }
     }
-    Some(polish(best, &knobs, target, scale).refit())
+    let refit = polish(best, &knobs, target, scale, deadline).refit();
+    Some(Estimate { refit, complete: !late(deadline) })
 }
 
 /// Line searches along the principal directions of the estimate, without derivatives: three points, the parabola through them, the best of all.
-fn polish(mut fit: Fit, knobs: &[Knob], target: Target, scale: &[f64]) -> Fit {
+fn polish(mut fit: Fit, knobs: &[Knob], target: Target, scale: &[f64], deadline: Option<Instant>) -> Fit {
     let n = knobs.len();
-    let Some(factor) = jacobian(&fit, knobs, target, scale, 1e-3)
+    let Some(factor) = jacobian(&fit, knobs, target, scale, 1e-3, deadline)
         .and_then(|j| Factor::of(&normal_equations(&j, &fit.residual).0, n, 1e-9))
     else {
         return fit;
@@ -60,6 +82,9 @@ fn polish(mut fit: Fit, knobs: &[Knob], target: Target, scale: &[f64]) -> Fit {
     let directions: Vec<Vec<f64>> = (0..n).map(|i| factor.back(unit(i))).collect();
     for radius in POLISH {
         for direction in &directions {
+            if late(deadline) {
+                return fit;
+            }
             let size = radius * fit.rms();
             let at = |t: f64| {
                 let step: Vec<f64> = direction.iter().map(|d| t * size * d).collect();
@@ -85,6 +110,8 @@ mod tests {
     use crate::input::{Hold, Input};
     use crate::law::{Effect, Law};
     use crate::refit::refit;
+
+    const PATIENCE: Duration = Duration::from_secs(3600);
 
     /// A noisy recording of a machine under steps of changing height: input, outputs, standard deviation of the noise.
     fn recorded(machine: &Machine, samples: usize, period: f64, level: f64) -> (Input, Vec<Vec<f64>>, Vec<f64>) {
@@ -143,7 +170,7 @@ mod tests {
             let (input, y, sigma) = recorded(&truth, 300, period, level);
             let target = Target { input: &input, y: &y };
             let exact = Fit::of(truth.clone(), target, &sigma).unwrap();
-            let found = oracle(&truth, target, &sigma).unwrap();
+            let found = oracle(&truth, target, &sigma, PATIENCE).unwrap().refit;
             assert!(found.rms <= exact.rms(), "{name}: {} against {} at the truth", found.rms, exact.rms());
             // A least-squares estimate of p parameters takes about p variances off the sum of squares; one that found nothing takes none.
             let taken = 300.0 * (exact.rms().powi(2) - found.rms.powi(2));
@@ -157,11 +184,21 @@ mod tests {
             let (input, y, sigma) = recorded(&truth, 300, period, level);
             let target = Target { input: &input, y: &y };
             let near = refit(&truth, target, &sigma, Scope::Effects, false, 20).unwrap();
-            let found = oracle(&truth, target, &sigma).unwrap();
+            let found = oracle(&truth, target, &sigma, PATIENCE).unwrap().refit;
             assert!(found.rms <= near.rms * (1.0 + 1e-9), "{name}");
             for (a, b) in found.machine.theta.iter().zip(&near.machine.theta).filter(|_| smooth) {
                 assert!((a / b - 1.0).abs() < 1e-3, "{name}: {a} against {b}");
             }
         }
+    }
+    #[test]
+    fn without_patience_it_stays_at_the_truth_and_says_so() {
+        let (_, _, truth, period, level) = machines().remove(0);
+        let (input, y, sigma) = recorded(&truth, 300, period, level);
+        let target = Target { input: &input, y: &y };
+        let cut = oracle(&truth, target, &sigma, Duration::ZERO).unwrap();
+        assert!(!cut.complete);
+        assert_eq!(cut.refit.machine.theta, truth.theta);
+        assert!(oracle(&truth, target, &sigma, PATIENCE).unwrap().complete);
     }
 }

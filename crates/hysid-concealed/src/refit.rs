@@ -4,6 +4,8 @@
 //! drive's own friction where a bristle law stands in its place) stays where it is.
 //! Used for the difficulty of a case (what the best baseline leaves) and for the recalibration-only competitor; [`crate::oracle`] builds on it.
 
+use std::time::Instant;
+
 use crate::input::Input;
 use crate::machine::Machine;
 
@@ -58,7 +60,7 @@ pub fn refit(
 ) -> Option<Refit> {
     let knobs = knobs(start, scope, free_initial, target);
     let first = Fit::of(start.clone(), target, scale)?;
-    Some(gauss_newton(first, &knobs, target, scale, STEP, rounds).refit())
+    Some(gauss_newton(first, &knobs, target, scale, STEP, rounds, None).refit())
 }
 
 /// A machine, its weighted residual and the sum of squares.
@@ -89,7 +91,12 @@ impl Fit {
     }
 }
 
-/// Damped Gauss-Newton from a fit, derivatives by forward differences with this relative step.
+/// Whether it is later than the deadline; never without one.
+pub(crate) fn late(deadline: Option<Instant>) -> bool {
+    deadline.is_some_and(|d| Instant::now() > d)
+}
+
+/// Damped Gauss-Newton from a fit, derivatives by forward differences with this relative step. Past the deadline the fit stays where it is.
 pub(crate) fn gauss_newton(
     mut fit: Fit,
     knobs: &[Knob],
@@ -97,13 +104,17 @@ pub(crate) fn gauss_newton(
     scale: &[f64],
     difference: f64,
     rounds: usize,
+    deadline: Option<Instant>,
 ) -> Fit {
     let mut lambda = 1e-6;
     for _ in 0..rounds {
-        let Some(jacobian) = jacobian(&fit, knobs, target, scale, difference) else { break };
+        let Some(jacobian) = jacobian(&fit, knobs, target, scale, difference, deadline) else { break };
         let (normal, gradient) = normal_equations(&jacobian, &fit.residual);
         let mut fall = 0.0;
         for _ in 0..8 {
+            if late(deadline) {
+                return fit;
+            }
             let Some(step) = solve(&normal, &gradient, knobs.len(), lambda) else {
                 lambda = (lambda * 10.0).max(1e-9);
                 continue;
@@ -221,17 +232,21 @@ fn residuals(machine: &Machine, target: Target, scale: &[f64]) -> Option<Vec<Vec
     Some(out)
 }
 
-/// Derivatives of the simulated output by forward differences.
+/// Derivatives of the simulated output by forward differences; `None` where the machine cannot be run or the deadline passes.
 pub(crate) fn jacobian(
     fit: &Fit,
     knobs: &[Knob],
     target: Target,
     scale: &[f64],
     difference: f64,
+    deadline: Option<Instant>,
 ) -> Option<Vec<Vec<f64>>> {
     knobs
         .iter()
         .map(|&knob| {
+            if late(deadline) {
+                return None;
+            }
             let mut moved = fit.machine.clone();
             turn(&mut moved, knob, difference);
             let r = residuals(&moved, target, scale)?;

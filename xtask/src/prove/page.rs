@@ -7,6 +7,7 @@ use anyhow::Context;
 use hysid_report::figure::{Mark, Plot, Tone};
 use hysid_report::page::{Align, Page, Table};
 
+use super::rivals::PATIENCE;
 use super::score::{CELLS, Line, Row, Score, Standing, shared};
 use super::stats::quantile;
 use super::verdict::Verdict;
@@ -90,8 +91,20 @@ pub fn times(seconds: &[f64]) -> String {
 
 /// The result as Markdown.
 pub fn markdown(score: &Score, command: &str, took: f64, rows: &[Row]) -> String {
-    let mut text =
-        format!("`{command}`: {} cases in {took:.0} s; a diagnosis takes {}.\n\n", rows.len(), times(&score.seconds));
+    let cut = rows.iter().filter(|r| !r.rivals.oracle_complete).count();
+    let cut = if cut > 0 {
+        let seconds = PATIENCE.as_secs();
+        format!(
+            " The oracle of {cut} cases was cut short after {seconds} s; it starts at the truth, so that its error may be too small."
+        )
+    } else {
+        String::new()
+    };
+    let mut text = format!(
+        "`{command}`: {} cases in {took:.0} s; a diagnosis takes {}.{cut}\n\n",
+        rows.len(),
+        times(&score.seconds)
+    );
     lines(&mut text, &score.lines);
     text.push_str("By difficulty, single effects:\n\n");
     table(&mut text, &DIFFICULTY, difficulty(score));

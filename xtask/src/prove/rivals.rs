@@ -2,6 +2,8 @@
 //!
 //! Errors are against the outputs without noise, in units of the noise, free run over the hold-out.
 
+use std::time::Duration;
+
 use hysid_concealed::case::{Case, Group, Record};
 use hysid_concealed::design::{Source, suits};
 use hysid_concealed::law::Law;
@@ -22,6 +24,8 @@ pub struct Rivals {
     pub before: f64,
     /// The true structure, estimated from the same recording.
     pub oracle: f64,
+    /// The search for that estimate came to its end within [`PATIENCE`].
+    pub oracle_complete: bool,
     /// Linear black box (output-error model).
     pub linear: f64,
     /// The same at 1.5 times the amplitude.
@@ -47,6 +51,8 @@ impl Rivals {
 const LONGEST: usize = 4000;
 /// Samples that the search for the best rival law looks at.
 const LOOK: usize = 2000;
+/// Time that the oracle of one case may take.
+pub const PATIENCE: Duration = Duration::from_secs(240);
 
 /// Fits and runs the competitors.
 pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
@@ -54,7 +60,8 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
     let recorded = Target { input: &case.est.input, y: &case.est.y };
     let sigma = &case.label.sigma;
     let calibrated = refit(&baseline, recorded, sigma, Scope::Plant, false, 12).map_or(baseline, |r| r.machine);
-    let truth = oracle(&case.machine, recorded, sigma).map_or_else(|| case.machine.clone(), |r| r.machine);
+    let (truth, oracle_complete) = oracle(&case.machine, recorded, sigma, PATIENCE)
+        .map_or_else(|| (case.machine.clone(), false), |e| (e.refit.machine, e.complete));
     let black = linear::fit(&case.est);
     let linear = |record: &Record| {
         black.as_ref().map_or(f64::INFINITY, |b| distance(&b.run(&record.input), &record.clean, &case.label.sigma))
@@ -63,6 +70,7 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
     Rivals {
         before: error(case, &calibrated, &case.val),
         oracle: error(case, &truth, &case.val),
+        oracle_complete,
         linear: linear(&case.val),
         linear_louder: case.louder.as_ref().map(linear),
         sindy: sindy::discrepancy(case, &calibrated).map(|m| error(case, &m, &case.val)),

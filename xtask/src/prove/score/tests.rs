@@ -17,6 +17,7 @@ fn row(group: Group, diagnosis: &dyn Fn(&Label) -> String, after: Option<f64>) -
     let rivals = Rivals {
         before: 1.0,
         oracle: 0.1,
+        oracle_complete: true,
         linear: 0.7,
         linear_louder: None,
         sindy: None,
