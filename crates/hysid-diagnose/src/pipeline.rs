@@ -17,12 +17,13 @@ use crate::hold::free_run;
 use crate::hypothesis::{Hypothesis, Setting};
 use crate::intake::{Intake, intake};
 use crate::left::Left;
+use crate::openset::uneven;
 use crate::picture::Picture;
 use crate::records::*;
 use crate::reliability::recalibrate;
 use crate::search::{calibrate, leaves_more};
 use crate::text::number;
-use crate::verdict::{Hypothesis as Weighed, NOT_FIRM, Support, verdict};
+use crate::verdict::{FIRM, Hypothesis as Weighed, NOT_FIRM, Support, verdict};
 use crate::weigh::*;
 
 /// Options of a diagnosis.
@@ -160,6 +161,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let left = Left::of(search, &pool, winner, significant);
     let probability = likelihoods(&pool, &weighed, &blocks, winner, left.imperfect);
     let mut support = firmness(&pool, &weighed, &probability, winner, left.imperfect);
+    let uneven = uneven(&pool[winner].base, setting.noise, &pool[winner].effects);
+    for (s, u) in support.iter_mut().zip(&uneven) {
+        s.discount(u.map_or(0.0, |u| u.probability));
+    }
     // A search that was cut short has not heard all rivals.
     if budget.unfinished() {
         support.iter_mut().for_each(Support::weaken);
@@ -203,7 +208,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         file.experiment = separating(setting, &contest, &mut file.alternatives, options.seed, hooks.expired);
     }
     file.remaining = left.record(&pool, winner);
-    if left.is_outside(&support, file.remaining.as_ref()) && !budget.unfinished() {
+    let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM);
+    if (elsewhere || left.is_outside(&support, file.remaining.as_ref())) && !budget.unfinished() {
         file.verdict = VerdictKind::NotInCatalogue;
     }
     // What is significant stays so, though no set outweighs its price: the likeliest is told, neither believed nor written.
@@ -236,13 +242,16 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     }
     let written = modelled.as_ref().or((named > 0).then_some(best));
     let last = modelled.as_ref().unwrap_or(best);
-    let spectrum = left.spectrum.then_some(
-        "a memory with many time scales were at work, a fractional element or a spectrum of relaxation times",
-    );
+    let spectrum = left
+        .spectrum
+        .then_some("a memory with many time scales, a fractional element or a spectrum of relaxation times");
     let (correction, varying) = left.believed().unzip();
     file.correction = correction;
     let varying = varying.flatten();
     file.notes.extend(varying.iter().map(|words| format!("what is left looks like something that varies: {words}")));
+
+    let unequal: Vec<String> = best.effects.iter().zip(&uneven).filter_map(|(e, u)| u.as_ref()?.words(e)).collect();
+    file.notes.extend(unequal.iter().map(|words| format!("{words}: the catalogue has no such law")));
 
     recalibrate(&mut file);
 
@@ -254,7 +263,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
     file.notes.extend(lacking(best, &candidates));
-    file.summary = summary(&file, varying.as_deref().or(spectrum));
+    let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
+    file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
     if let Some(note) = budget.note() {
         if unexplained {
             file.summary = "Something is missing; the search was cut short by the time limit before an effect was found that explains it.".into();

@@ -250,8 +250,9 @@ pub fn absorbing(base: &Base<'_>, simulation: &Simulation) -> Vec<String> {
     out
 }
 
-/// The verdict in a sentence or two; `varying` says what varies, where a correction without a name says so.
-pub fn summary(file: &DiagnosisFile, varying: Option<&str>) -> String {
+/// The verdict in a sentence or two; `varying` says what varies, where a correction without a name says so, `unequal` which strength may depend on
+/// the motion.
+pub fn summary(file: &DiagnosisFile, varying: Option<&str>, unequal: Option<&str>) -> String {
     let sentences = || file.effects.iter().map(|e| e.sentence.clone()).collect::<Vec<_>>().join(" ");
     let rivals = || {
         file.alternatives
@@ -274,11 +275,14 @@ pub fn summary(file: &DiagnosisFile, varying: Option<&str>) -> String {
             "Something is missing, and nothing that was fitted explains it.".into()
         }
         VerdictKind::Ambiguous => {
-            format!("Several explanations remain: {}. The likeliest set: {}", rivals(), sentences())
+            let or = unequal.map_or_else(String::new, |u| format!(", or a law that the catalogue does not have ({u})"));
+            format!("Several explanations remain: {}{or}. The likeliest set: {}", rivals(), sentences())
         }
-        VerdictKind::NotInCatalogue => match varying {
+        VerdictKind::NotInCatalogue => match varying.or(unequal) {
             Some(varying) => {
-                format!("Something is missing that no mechanism of the catalogue explains: it looks as if {varying}.")
+                format!(
+                    "Something is missing that no mechanism of the catalogue explains. What it looks like: {varying}."
+                )
             }
             None => {
                 "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it."

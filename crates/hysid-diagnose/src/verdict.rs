@@ -56,6 +56,12 @@ pub struct Support {
 }
 
 impl Support {
+    /// Takes off the probability of a law that the catalogue has not got.
+    pub fn discount(&mut self, outside: f64) {
+        self.mechanism *= 1.0 - outside;
+        self.family *= 1.0 - outside;
+    }
+
     /// No longer firm: something shows that the set is not the whole truth.
     pub fn weaken(&mut self) {
         self.mechanism = self.mechanism.min(NOT_FIRM);

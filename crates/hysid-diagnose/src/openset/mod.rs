@@ -14,6 +14,7 @@ mod modulation;
 mod needed;
 mod signature;
 mod terms;
+mod uneven;
 mod varying;
 mod written;
 
@@ -28,6 +29,7 @@ use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 pub use needed::fitted;
 use signature::signature;
 use terms::{Kind, Term, terms};
+pub use uneven::uneven;
 use varying::{Varying, varying};
 use written::{Sparse, with_oscillation};
 

@@ -83,15 +83,15 @@ struct Candidate {
 }
 
 /// The residual under a noise, off what is estimated besides.
-struct View<'a> {
+pub(super) struct View<'a> {
     noise: &'a Whitener,
     layout: &'a Layout,
     own: Projector,
-    r: Vec<f64>,
+    pub(super) r: Vec<f64>,
 }
 
 impl<'a> View<'a> {
-    fn new(base: &'a Base<'_>, noise: &'a Whitener) -> Self {
+    pub(super) fn new(base: &'a Base<'_>, noise: &'a Whitener) -> Self {
         let layout = &base.model.data().layout;
         let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
         let mut r = noise.apply(layout, &base.fit.residual);
@@ -99,13 +99,18 @@ impl<'a> View<'a> {
         Self { noise, layout, own, r }
     }
 
-    fn of(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    pub(super) fn of(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let white = |x: &Vec<f64>| {
             let mut w = self.noise.apply(self.layout, x);
             self.own.remove(&mut w);
             w
         };
         columns.iter().map(white).collect()
+    }
+
+    /// Squared norm of a column under the noise, with what is estimated besides in it.
+    pub(super) fn noise_of(&self, column: &[f64]) -> f64 {
+        norm2(&self.noise.apply(self.layout, column))
     }
 
     /// Log likelihood that free amplitudes of a few columns gain.
