@@ -159,7 +159,7 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Opti
                     moving.insert(symbol.to_owned(), all);
                 }
             }
-            let mut signals = Signals::new(data.period_s, start_s, moving);
+            let mut signals = Signals::new(data.period_s, start_s, moving).held(simulation.time.hold);
             signals.stretches.clone_from(&stretches);
             signals.constants = constants;
             signals.peaks_hz = peaks_hz.to_vec();

@@ -78,7 +78,7 @@ pub fn example_signals(simulation: &Simulation, slot: &Slot) -> Signals {
             }
         }
     }
-    let mut signals = Signals::new(period_s, 0.0, series);
+    let mut signals = Signals::new(period_s, 0.0, series).held(simulation.time.hold);
     signals.constants = constants;
     signals
 }

@@ -60,7 +60,7 @@ fn product_of_units(slot: &Slot, measure: &Expr) -> Option<Unit> {
     use hysid_plant::BinaryOp::{Div, Mul, Pow};
     match measure {
         Expr::Number(_) => Some(Unit::none()),
-        Expr::Symbol(s) if matches!(s.as_str(), "t" | "T" | "h") => Unit::parse("s").ok(),
+        Expr::Symbol(s) if matches!(s.as_str(), "t" | "T" | "h" | "h_u") => Unit::parse("s").ok(),
         Expr::Symbol(s) => slot.quantity(s)?.unit.clone(),
         Expr::Binary(Mul, a, b) => Some(product_of_units(slot, a)?.times(&product_of_units(slot, b)?)),
         Expr::Binary(Div, a, b) => Some(product_of_units(slot, a)?.per(&product_of_units(slot, b)?)),

@@ -6,10 +6,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use hysid_plant::{BinaryOp, Expr, Function};
+use hysid_plant::{BinaryOp, Expr, Function, Hold};
 
 use super::Grid;
 use super::resolution::resolution;
+
+/// Share of a period over which the way on a straight line is taken: less than a step of the integration.
+const PIECE: f64 = 0.03;
 
 /// The signals at one slot: the baseline's run on the recordings, in the symbols of the slot.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +27,8 @@ pub struct Signals {
     pub series: BTreeMap<String, Vec<f64>>,
     /// The value of each symbol of the slot that does not move (`k`, `c`, `m`, `p`).
     pub constants: BTreeMap<String, f64>,
+    /// Time over which the way of an input, divided by it, is the rate at which the input moves, in seconds.
+    pub way_s: f64,
     measured: Option<Vec<f64>>,
     step: OnceLock<Option<f64>>,
     /// Lowest and highest excited frequency, in Hz.
@@ -45,11 +50,22 @@ impl Signals {
             stretches,
             series,
             constants: BTreeMap::new(),
+            way_s: period_s,
             measured: None,
             step: OnceLock::new(),
             band_hz,
             peaks_hz: Vec::new(),
         }
+    }
+
+    /// The same for an input that is held so between its samples. A held input moves once in each period; on a straight line its rate is that of
+    /// the piece that it is on, and the way over a whole period would mix two of them, most where the input turns.
+    pub fn held(mut self, hold: Hold) -> Self {
+        self.way_s = match hold {
+            Hold::Zero => self.period_s,
+            Hold::Linear => PIECE * self.period_s,
+        };
+        self
     }
 
     /// Duration of the longest stretch, in seconds.
@@ -64,11 +80,12 @@ impl Signals {
     }
 
     /// The natural size of a symbol: standard deviation of a signal (rms of a force), absolute value of a constant, duration
-    /// for `T`, sampling period for `h`, one second for `t`. `None` where it is not known or zero.
+    /// for `T`, sampling period for `h`, the time of an input's way for `h_u`, one second for `t`. `None` where it is not known or zero.
     pub fn size(&self, symbol: &str) -> Option<f64> {
         let size = match symbol {
             "T" => self.duration_s(),
             "h" => self.period_s,
+            "h_u" => self.way_s,
             "t" => 1.0,
             _ => match (self.constants.get(symbol), self.series.get(symbol)) {
                 (Some(value), _) => value.abs(),
