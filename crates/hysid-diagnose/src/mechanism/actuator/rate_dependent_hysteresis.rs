@@ -66,7 +66,7 @@ mod tests {
     fn the_rate_is_that_of_the_piece_between_two_samples_however_the_input_is_held() {
         let period = 0.01;
         let input: Vec<f64> =
-            (0..400).map(|i| 9.0 * (0.21 * f64::from(i)).sin() * (0.013 * f64::from(i)).cos()).collect();
+            (0..400).map(|i| 9.0 * (1.3 * f64::from(i)).sin() * (0.013 * f64::from(i)).cos()).collect();
         let (p, lambda) = (0.06, 2e-3);
         for hold in ["linear", "zero"] {
             let text = format!(
