@@ -48,7 +48,7 @@ mod tests {
     use crate::mechanism::{Form, Signals};
     use crate::slot::Structure;
 
-    /// Plays whose half-width is that of the rate from one sample to the next, sample by sample: on a piece without a turn the end decides.
+    /// Plays whose half-width is that of the rate from one sample to the next.
     fn by_samples(u: &[f64], period: f64, radius: f64, lambda: f64) -> Vec<f64> {
         let mut w = 0.0f64;
         let mut before = u[0];
@@ -67,11 +67,14 @@ mod tests {
         let period = 0.01;
         let input: Vec<f64> =
             (0..400).map(|i| 9.0 * (1.3 * f64::from(i)).sin() * (0.013 * f64::from(i)).cos()).collect();
-        let (p, lambda) = (0.06, 2e-3);
-        for hold in ["linear", "zero"] {
+        let (p, lambda) = (0.06, 5e-4);
+        // On a straight line every part of a piece has its rate; a held input moves at the samples only.
+        for (hold, parts) in [("linear", 32), ("zero", 1)] {
             let text = format!(
                 "title = \"Actuator\"\n[time]\nperiod_s = 0.01\nhold = \"{hold}\"\n[inputs]\nu = \"u_V\"\n[parameters]\n\
-                 g = {{ value = 1.0, min = 0.1, max = 10.0, unit = \"um/V\" }}\n[outputs]\ny_um = \"g*u\"\n"
+                 g = {{ value = 1.0, min = 0.1, max = 10.0, unit = \"um/V\" }}\n\
+                 tau = {{ value = 0.02, min = 0.001, max = 1.0, unit = \"s\" }}\n\
+                 [states]\nx = {{ derivative = \"(g*u - x)/tau\", initial = 0.0 }}\n[outputs]\ny_um = \"x\"\n"
             );
             let simulation = Simulation::parse(&text, "actuator.sim.toml").unwrap();
             let slot = RATE_DEPENDENT_HYSTERESIS.slots(&Structure::of(&simulation)).swap_remove(0);
@@ -84,14 +87,27 @@ mod tests {
             (1..=6).for_each(|i| set(&format!("p_{i}"), if i == 2 { p } else { 0.0 }));
             set("r_s", 1.5);
             set("lambda", lambda);
-            let compiled = Compiled::new(&written).unwrap();
-            let drive = Drive::new(0.0, period, input.len(), vec![input.clone()]).unwrap();
-            let y = compiled.simulate(&Run::new(&drive, &compiled.theta())).outputs.swap_remove(0);
-            let expected = by_samples(&input, period, 3.0, lambda);
-            let off = |(y, (u, w)): (&f64, (&f64, &f64))| (y - (u + p * (w - u))).powi(2);
-            let error = (y.iter().zip(input.iter().zip(&expected)).map(off).sum::<f64>() / 400.0).sqrt();
-            let effect = (input.iter().zip(&expected).map(|(u, w)| (p * (w - u)).powi(2)).sum::<f64>() / 400.0).sqrt();
-            assert!(error < 0.03 * effect, "{hold}: {error} of {effect}");
+            let finer: Vec<f64> = input
+                .windows(2)
+                .flat_map(|w| (0..parts).map(move |i| w[0] + (w[1] - w[0]) * f64::from(i) / f64::from(parts)))
+                .chain(input.last().copied())
+                .collect();
+            let short = period / f64::from(parts);
+            let answer = |simulation: &Simulation, period: f64, input: &[f64]| {
+                let compiled = Compiled::new(simulation).unwrap();
+                let drive = Drive::new(0.0, period, input.len(), vec![input.to_vec()]).unwrap();
+                let mut outputs =
+                    compiled.simulate(&Run { substeps: 8, ..Run::new(&drive, &compiled.theta()) }).outputs;
+                outputs.swap_remove(0)
+            };
+            let bent: Vec<f64> =
+                by_samples(&finer, short, 3.0, lambda).iter().zip(&finer).map(|(w, u)| u + p * (w - u)).collect();
+            let (y, plain) = (answer(&written, period, &input), answer(&simulation, period, &input));
+            let expected: Vec<f64> = answer(&simulation, short, &bent).into_iter().step_by(parts as usize).collect();
+            let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+            assert_eq!(expected.len(), y.len());
+            let (error, effect) = (off(&y, &expected), off(&plain, &expected));
+            assert!(error < 0.1 * effect, "{hold}: {error} of {effect}");
         }
     }
 }
