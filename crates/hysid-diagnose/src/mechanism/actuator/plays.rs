@@ -1,7 +1,7 @@
 //! The plays that the laws of an actuator's hysteresis are sums of, in each of the forms that such a law is fitted in.
 //!
 //! Three plays are what most recordings tell. More are taken where the evidence asks for them:
-//! - a density that falls off with the half-width, half of a normal one over twelve cells, up to a widest one: three numbers follow a smooth loop, and there is no
+//! - a density that falls off with the half-width, half of a normal one over twelve cells: two numbers follow a smooth loop, and there is no
 //!   weight that the recording leaves open;
 //! - six plays with half-widths that are shares of the input's reach;
 //! - six whose half-widths are the multiples of one spacing that is fitted too. The initial loading curve of such an operator is made of
@@ -60,7 +60,7 @@ impl Plays {
             Purpose::Form(Form::Smooth) => law
                 .amplitude("p", "1", -0.2, 5.0)
                 .shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0]))
-                .shape("r_w", "u", Grid::Reach("u", [0.65, 1.0].map(|s| s / CELLS as f64).to_vec())),
+                .constant("r_w", "u", Grid::Reach("u", vec![1.0 / CELLS as f64])),
             Purpose::Form(Form::Spaced) => (1..=SPACED).fold(law, weight).shape(
                 "r_s",
                 "u",
