@@ -161,7 +161,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let left = Left::of(search, &pool, winner, significant);
     let probability = likelihoods(&pool, &weighed, &blocks, winner, left.imperfect);
     let mut support = firmness(&pool, &weighed, &probability, winner, left.imperfect);
-    let uneven = uneven(&pool[winner].base, setting.noise, &pool[winner].effects);
+    // Where something is left, or rivals were not heard, nothing is firm anyway, and what is missing looks like a strength that varies.
+    let uneven = if left.imperfect || budget.unfinished() {
+        vec![None; pool[winner].effects.len()]
+    } else {
+        uneven(&pool[winner].base, setting.noise, &pool[winner].effects)
+    };
     for (s, u) in support.iter_mut().zip(&uneven) {
         s.discount(u.map_or(0.0, |u| u.probability));
     }
