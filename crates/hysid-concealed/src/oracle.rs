@@ -6,7 +6,8 @@
 //! the truth, coarse differences before fine ones, and, where two searches disagree, a polish without derivatives in steps of one standard error. The least
 //! sum of squares wins, and it is never above that of the truth.
 //!
-//! Told beforehand and not estimated: what lays out a path or a grid (times, widths of plays, the bit of a converter, see `refit`).
+//! Estimated is whatever the recording tells ([`Scope::Whole`]): the time of a change, the widths and weights of plays, and, where the simulation
+//! file leaves it free, the initial state. Told beforehand are the path of a random walk and the bit of a converter.
 
 use std::time::{Duration, Instant};
 
@@ -37,13 +38,19 @@ pub struct Estimate {
     pub complete: bool,
 }
 
-/// Estimates the parameters of plant and effects of `truth` from a recording; channel `c` is divided by `scale[c]`. `None` where the true
-/// machine cannot be run.
+/// Estimates the parameters of plant and effects of `truth` from a recording, its initial state too where that is free; channel `c` is divided
+/// by `scale[c]`. `None` where the true machine cannot be run.
 ///
 /// A stiff law over a long recording costs seconds a simulation, and the search hundreds of them: past `patience` it ends with what it has.
-pub fn oracle(truth: &Machine, target: Target, scale: &[f64], patience: Duration) -> Option<Estimate> {
+pub fn oracle(
+    truth: &Machine,
+    target: Target,
+    scale: &[f64],
+    free_initial: bool,
+    patience: Duration,
+) -> Option<Estimate> {
     let deadline = Instant::now().checked_add(patience);
-    let knobs = knobs(truth, Scope::Effects, false, target);
+    let knobs = knobs(truth, Scope::Whole, free_initial, target);
     let from = |start: Machine, steps: &[(f64, usize)]| {
         let start = Fit::of(start, target, scale)?;
         Some(
@@ -133,7 +140,12 @@ mod tests {
         Machine { kind, theta, effects, initial: vec![0.0; 2], channels: 1, regularised: None }
     }
 
-    /// Machines that move smoothly, that stick, that strike, and one whose own friction a bristle law replaces.
+    /// A spring that loses a third of its stiffness.
+    fn change() -> Effect {
+        Effect { theta: 2, ..Effect::new(Law::AbruptChange, vec![-0.33, 4.0]) }
+    }
+
+    /// Machines that move smoothly, that stick, that strike, one whose own friction a bristle law replaces, one that changes, one behind plays.
     fn machines() -> Vec<(&'static str, bool, Machine, f64, f64)> {
         let oscillator = [2.0, 1.5, 80.0];
         let drive = [0.2, 0.3, 0.5];
@@ -161,6 +173,21 @@ mod tests {
             ),
             ("stuck", false, machine(Kind::Drive, &drive, vec![Effect::new(Law::InputOffset, vec![0.1])]), 0.05, 1.0),
             ("bristles", false, machine(Kind::Drive, &drive, vec![Effect::new(Law::Dahl, vec![0.5, 0.05])]), 0.05, 1.0),
+            ("change", false, machine(Kind::Oscillator, &oscillator, vec![change()]), 0.03, 10.0),
+            (
+                "plays",
+                false,
+                machine(
+                    Kind::Oscillator,
+                    &oscillator,
+                    vec![Effect::new(
+                        Law::PrandtlIshlinskii,
+                        vec![0.5, 2.0, 4.0, 6.0, 8.0, 10.0, 0.3, 0.2, 0.2, 0.2, 0.1],
+                    )],
+                ),
+                0.03,
+                10.0,
+            ),
         ]
     }
 
@@ -170,7 +197,7 @@ mod tests {
             let (input, y, sigma) = recorded(&truth, 300, period, level);
             let target = Target { input: &input, y: &y };
             let exact = Fit::of(truth.clone(), target, &sigma).unwrap();
-            let found = oracle(&truth, target, &sigma, PATIENCE).unwrap().refit;
+            let found = oracle(&truth, target, &sigma, false, PATIENCE).unwrap().refit;
             assert!(found.rms <= exact.rms(), "{name}: {} against {} at the truth", found.rms, exact.rms());
             // A least-squares estimate of p parameters takes about p variances off the sum of squares; one that found nothing takes none.
             let taken = 300.0 * (exact.rms().powi(2) - found.rms.powi(2));
@@ -183,8 +210,8 @@ mod tests {
         for (name, smooth, truth, period, level) in machines() {
             let (input, y, sigma) = recorded(&truth, 300, period, level);
             let target = Target { input: &input, y: &y };
-            let near = refit(&truth, target, &sigma, Scope::Effects, false, 20).unwrap();
-            let found = oracle(&truth, target, &sigma, PATIENCE).unwrap().refit;
+            let near = refit(&truth, target, &sigma, Scope::Whole, false, 20).unwrap();
+            let found = oracle(&truth, target, &sigma, false, PATIENCE).unwrap().refit;
             assert!(found.rms <= near.rms * (1.0 + 1e-9), "{name}");
             for (a, b) in found.machine.theta.iter().zip(&near.machine.theta).filter(|_| smooth) {
                 assert!((a / b - 1.0).abs() < 1e-3, "{name}: {a} against {b}");
@@ -192,13 +219,28 @@ mod tests {
         }
     }
     #[test]
+    fn the_time_of_a_change_is_estimated_and_so_is_a_start_that_is_free() {
+        let mut truth = machine(Kind::Oscillator, &[2.0, 1.5, 80.0], vec![change()]);
+        truth.initial = vec![0.05, -0.3];
+        let (input, y, sigma) = recorded(&truth, 400, 0.03, 10.0);
+        let target = Target { input: &input, y: &y };
+        let at_rest = oracle(&truth, target, &sigma, false, PATIENCE).unwrap().refit.machine;
+        assert_eq!(at_rest.initial, truth.initial, "a start that is known stays");
+        let found = oracle(&truth, target, &sigma, true, PATIENCE).unwrap().refit.machine;
+        let time = found.effects[0].p[1];
+        assert!(time != 4.0 && (time - 4.0).abs() < 0.03, "{time}");
+        assert!(found.initial != truth.initial);
+        assert!((found.initial[0] - 0.05).abs() < 0.02 && (found.initial[1] + 0.3).abs() < 0.1, "{:?}", found.initial);
+    }
+
+    #[test]
     fn without_patience_it_stays_at_the_truth_and_says_so() {
         let (_, _, truth, period, level) = machines().remove(0);
         let (input, y, sigma) = recorded(&truth, 300, period, level);
         let target = Target { input: &input, y: &y };
-        let cut = oracle(&truth, target, &sigma, Duration::ZERO).unwrap();
+        let cut = oracle(&truth, target, &sigma, false, Duration::ZERO).unwrap();
         assert!(!cut.complete);
         assert_eq!(cut.refit.machine.theta, truth.theta);
-        assert!(oracle(&truth, target, &sigma, PATIENCE).unwrap().complete);
+        assert!(oracle(&truth, target, &sigma, false, PATIENCE).unwrap().complete);
     }
 }

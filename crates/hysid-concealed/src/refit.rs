@@ -14,7 +14,7 @@ use crate::machine::Machine;
 pub struct Target<'a> {
     /// Input.
     pub input: &'a Input,
-    /// Recorded outputs.
+    /// Recorded outputs; only as many samples are simulated as they have.
     pub y: &'a [Vec<f64>],
 }
 
@@ -42,8 +42,10 @@ pub struct Refit {
 pub enum Scope {
     /// Plant parameters.
     Plant,
-    /// Plant parameters and the effects' parameters.
+    /// Plant parameters and the effects' magnitudes; what lays out a path or a grid stays.
     Effects,
+    /// Whatever the recording tells of the plant and the effects: times of a change, widths and weights of plays, too.
+    Whole,
 }
 
 /// Relative step of the finite differences: small enough for a derivative, large against the integrator's tolerance.
@@ -148,46 +150,61 @@ pub(crate) fn moved(machine: &Machine, knobs: &[Knob], step: &[f64], largest: f6
 /// The knobs of the machine.
 pub(crate) fn knobs(machine: &Machine, scope: Scope, free_initial: bool, target: Target) -> Vec<Knob> {
     let mut list: Vec<Knob> = (0..machine.theta.len()).map(Knob::Theta).collect();
-    if scope == Scope::Effects {
+    if scope != Scope::Plant {
         for (i, e) in machine.effects.iter().enumerate() {
             for (j, value) in e.p.iter().enumerate() {
-                if *value != 0.0 && fitted(e.law.parameters()[j]) {
+                let name = e.law.parameters()[j];
+                if *value != 0.0 && told_by_a_recording(name) && (scope == Scope::Whole || !lays_out(name)) {
                     list.push(Knob::Effect(i, j));
                 }
             }
         }
     }
     if free_initial {
-        let size = target.y.iter().flatten().fold(0.0_f64, |a, v| a.max(v.abs()));
-        let rate = size / (target.input.period() * 10.0);
-        let masses = machine.kind.masses();
-        for i in 0..machine.initial.len() {
-            list.push(Knob::Initial(i, if i < masses.max(1) { size } else { rate }));
-        }
+        list.extend(start(machine, target));
     }
     list
 }
 
-/// Parameters that define a path or a grid rather than a magnitude stay as they are.
-fn fitted(name: &str) -> bool {
-    !matches!(
-        name,
-        "T" | "seed"
-            | "u_max"
-            | "w_1"
-            | "w_2"
-            | "w_3"
-            | "w_4"
-            | "w_5"
-            | "r_1"
-            | "r_2"
-            | "r_3"
-            | "r_4"
-            | "r_5"
-            | "P_0"
-            | "t_0"
-            | "lsb"
-    )
+/// The knobs of the initial plant states.
+fn start(machine: &Machine, target: Target) -> impl Iterator<Item = Knob> {
+    let size = target.y.iter().flatten().fold(0.0_f64, |a, v| a.max(v.abs()));
+    let rate = size / (target.input.period() * 10.0);
+    let masses = machine.kind.masses();
+    (0..machine.initial.len()).map(move |i| Knob::Initial(i, if i < masses.max(1) { size } else { rate }))
+}
+
+/// Rounds for an initial state alone.
+const ROUNDS_OF_A_START: usize = 8;
+
+/// The machine started from the state that fits the beginning of a recording best, its parameters as they are: what a user does who does not
+/// know the initial state. `target.y` holds the samples that may settle it, `target.input` the whole input. The search begins at the machine's
+/// own initial state and at rest: where friction sticks the two may end apart. Where the machine cannot be run, or its motion is prescribed, it
+/// comes back unchanged.
+pub fn started(machine: &Machine, target: Target, scale: &[f64]) -> Machine {
+    let knobs: Vec<Knob> = start(machine, target).collect();
+    if knobs.is_empty() {
+        return machine.clone();
+    }
+    let at_rest = Machine { initial: vec![0.0; machine.initial.len()], ..machine.clone() };
+    [machine.clone(), at_rest]
+        .into_iter()
+        .filter_map(|from| Fit::of(from, target, scale))
+        .map(|fit| gauss_newton(fit, &knobs, target, scale, STEP, ROUNDS_OF_A_START, None))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+        .map_or_else(|| machine.clone(), |fit| fit.machine)
+}
+
+/// Parameters that lay out a path or a grid rather than give a magnitude.
+fn lays_out(name: &str) -> bool {
+    let of_a_play = |rest: &str| matches!(rest, "_1" | "_2" | "_3" | "_4" | "_5");
+    matches!(name, "u_max" | "t_0") || name.strip_prefix(['r', 'w']).is_some_and(of_a_play)
+}
+
+/// Whether a recording tells a parameter at all: not the seed of a random walk, nor what only scales another parameter (a length of time, a
+/// power), nor the bit of a converter, between whose steps nothing changes.
+fn told_by_a_recording(name: &str) -> bool {
+    !matches!(name, "T" | "seed" | "P_0" | "lsb")
 }
 
 fn turn(machine: &mut Machine, knob: Knob, step: f64) {
@@ -220,7 +237,8 @@ fn size_of_signed(machine: &Machine, i: usize) -> f64 {
 }
 
 fn residuals(machine: &Machine, target: Target, scale: &[f64]) -> Option<Vec<Vec<f64>>> {
-    let y = machine.run(target.input, None).ok()?;
+    let samples = target.y.first().map_or(0, Vec::len);
+    let y = machine.run_for(target.input, samples, None).ok()?;
     let mut out = Vec::with_capacity(y.len());
     for ((simulated, recorded), s) in y.iter().zip(target.y).zip(scale) {
         let column: Vec<f64> = recorded.iter().zip(simulated).map(|(a, b)| (a - b) / s).collect();
@@ -341,6 +359,34 @@ impl Factor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::Kind;
+    use crate::input::Hold;
+    use crate::law::{Effect, Law};
+
+    #[test]
+    fn a_start_is_found_from_the_beginning_of_a_recording_and_the_rest_is_not_looked_at() {
+        let truth = |effects, initial| Machine {
+            kind: Kind::Drive,
+            theta: vec![0.2, 0.3, 0.1],
+            effects,
+            initial,
+            channels: 1,
+            regularised: None,
+        };
+        let values = (0..200).map(|k| (f64::from(k) * 0.3).sin()).collect();
+        let input = Input::Held { values, period: 0.05, hold: Hold::Zero };
+        for effects in [Vec::new(), vec![Effect::new(Law::RateDependent, vec![0.3, 1.0, 0.5])]] {
+            let moving = truth(effects.clone(), vec![0.2, 0.4]);
+            let y = moving.run(&input, None).unwrap();
+            let beginning = vec![y[0][..20].to_vec()];
+            assert_eq!(moving.run_for(&input, 20, None).unwrap(), beginning);
+            let still = truth(effects, vec![0.0, 0.0]);
+            let found = started(&still, Target { input: &input, y: &beginning }, &[0.01]);
+            assert_eq!(found.theta, still.theta);
+            let off = |i: usize| (found.initial[i] - moving.initial[i]).abs();
+            assert!(off(0) < 1e-3 && off(1) < 1e-2, "{:?}", found.initial);
+        }
+    }
 
     #[test]
     fn an_unknown_without_bearing_stays_and_the_others_are_solved_as_if_it_were_absent() {

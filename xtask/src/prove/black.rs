@@ -7,7 +7,8 @@ use hysid_concealed::case::{Case, Record};
 use hysid_concealed::input::Input;
 use hysid_concealed::machine::Machine;
 
-use super::trial::{Bench, distance, read_columns};
+use super::free_run::{distance, free_run};
+use super::trial::{Bench, read_columns};
 
 /// Errors of a black box: on the hold-out, and at 1.5 times the amplitude.
 pub type Errors = (f64, Option<f64>);
@@ -30,7 +31,7 @@ impl Bench {
             return failed;
         }
         let base = |record: &Record| match baseline {
-            Some(machine) => machine.run(&record.input, None).ok().map(|mut y| y.remove(0)),
+            Some(machine) => free_run(case, machine, record).map(|mut y| y.remove(0)),
             None => Some(vec![0.0; record.input.len()]),
         };
         let write = |record: &Record, y: &[f64], file: &str| -> Option<Vec<f64>> {

@@ -9,6 +9,7 @@ mod agreement;
 mod black;
 mod controls;
 mod experiment;
+mod free_run;
 mod guard;
 mod linear;
 mod page;

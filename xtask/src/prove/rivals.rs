@@ -13,9 +13,10 @@ use hysid_concealed::refit::{Scope, Target, refit};
 use hysid_concealed::seed::{Random, Stream};
 
 use super::black::Errors;
+use super::free_run::{distance, error};
 use super::linear;
 use super::sindy;
-use super::trial::{Bench, distance};
+use super::trial::Bench;
 
 /// Errors of the competitors on one case.
 #[derive(Debug, Clone)]
@@ -59,8 +60,9 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
     let baseline = case.design.baseline(&case.machine.effects);
     let recorded = Target { input: &case.est.input, y: &case.est.y };
     let sigma = &case.label.sigma;
-    let calibrated = refit(&baseline, recorded, sigma, Scope::Plant, false, 12).map_or(baseline, |r| r.machine);
-    let (truth, oracle_complete) = oracle(&case.machine, recorded, sigma, PATIENCE)
+    let calibrated =
+        refit(&baseline, recorded, sigma, Scope::Plant, case.free_initial, 12).map_or(baseline, |r| r.machine);
+    let (truth, oracle_complete) = oracle(&case.machine, recorded, sigma, case.free_initial, PATIENCE)
         .map_or_else(|| (case.machine.clone(), false), |e| (e.refit.machine, e.complete));
     let black = linear::fit(&case.est);
     let linear = |record: &Record| {
@@ -78,11 +80,6 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
         narx_on_residual: if short { bench.narx_on_residual(case, &calibrated) } else { unknown },
         separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
     }
-}
-
-/// Free-run error of a machine on a record.
-pub fn error(case: &Case, machine: &Machine, record: &Record) -> f64 {
-    machine.run(&record.input, None).map_or(f64::INFINITY, |y| distance(&y, &record.clean, &case.label.sigma))
 }
 
 /// Squared distance from the outputs without noise to the best law of the catalogue.

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, ensure};
 use hysid_concealed::case::{Case, Record};
 
+use super::free_run::distance;
 use super::verdict::Verdict;
 
 /// What came of a case.
@@ -109,20 +110,6 @@ impl Bench {
             read_columns(&std::fs::read_to_string(&prediction)?, &case.design.kind.outputs()[..record.clean.len()])?;
         Ok(distance(&columns, &record.clean, &case.label.sigma))
     }
-}
-
-/// Rms over all channels of the difference in units of the noise, without the first 5 % of the samples.
-pub fn distance(y: &[Vec<f64>], clean: &[Vec<f64>], sigma: &[f64]) -> f64 {
-    let mut sum = 0.0;
-    let mut count = 0;
-    for ((a, b), s) in y.iter().zip(clean).zip(sigma) {
-        for (a, b) in a.iter().zip(b).skip(b.len() / 20) {
-            sum += ((a - b) / s).powi(2);
-            count += 1;
-        }
-    }
-    let rms = (sum / f64::from(count.max(1))).sqrt();
-    if rms.is_finite() { rms } else { f64::INFINITY }
 }
 
 /// Columns of a CSV text by name.

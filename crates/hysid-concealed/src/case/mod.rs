@@ -49,6 +49,8 @@ pub struct Case {
     pub louder: Option<Record>,
     /// `baseline.sim.toml`.
     pub simulation: String,
+    /// It leaves the initial state free; the machine begins at rest.
+    pub free_initial: bool,
     /// First time stamp in seconds.
     pub clock: f64,
 }
@@ -160,8 +162,8 @@ impl Case {
         // The file says `sign`: a smoothed law creeps where the machine sticks, and even at a thousandth of the speed the creep adds up to
         // more than the noise. A smoothed law is a fault of the simulation and an effect of its own.
         let regularised = machine.effects.iter().find(|e| e.law == Law::SolverArtefact).map(|e| e.p[0]);
-        let initial = if random.chance(0.3) { "\"free\"" } else { "0.0" };
-        let simulation = simulation(&design, &declared, regularised, initial);
+        let free_initial = random.chance(0.3);
+        let simulation = simulation(&design, &declared, regularised, if free_initial { "\"free\"" } else { "0.0" });
         let names = kind.parameters();
         let mut effects: Vec<Concealed> = machine.effects.iter().map(|e| concealed(&design, e)).collect();
         for (i, law) in simpler(&design, &tuned) {
@@ -186,7 +188,7 @@ impl Case {
             declared: names.iter().copied().zip(declared).collect(),
             rejected,
         };
-        Some(Self { label, design, machine, est, val, louder, simulation, clock })
+        Some(Self { label, design, machine, est, val, louder, simulation, free_initial, clock })
     }
 }
 

@@ -51,6 +51,11 @@ pub struct Loop<'a> {
 impl Machine {
     /// Outputs (one column for each channel) at the samples of `input`. `force` is an unknown force, held, on the driven mass (or inflow).
     pub fn run(&self, input: &Input, force: Option<&[f64]>) -> Result<Vec<Vec<f64>>, Failed> {
+        self.run_for(input, input.len(), force)
+    }
+
+    /// The same for the first `samples` of the input.
+    pub fn run_for(&self, input: &Input, samples: usize, force: Option<&[f64]>) -> Result<Vec<Vec<f64>>, Failed> {
         let mut command = match input {
             Input::Held { values, hold, period } => Command {
                 values: through_hysteresis(values, &self.effects, *period),
@@ -62,7 +67,7 @@ impl Machine {
                 Command { values: Vec::new(), hold: Hold::Linear, period: *period, feedback: None }
             }
         };
-        self.drive(&mut command, input, force)
+        self.drive(&mut command, input, samples, force)
     }
 
     /// The command that the loop gives, and the outputs.
@@ -71,12 +76,18 @@ impl Machine {
         let period = feedback.period;
         let input = Input::Held { values: vec![0.0; n], period, hold: Hold::Zero };
         let mut command = Command { values: Vec::new(), hold: Hold::Zero, period, feedback: Some(feedback.clone()) };
-        let y = self.drive(&mut command, &input, None)?;
+        let y = self.drive(&mut command, &input, n, None)?;
         Ok((command.values, y))
     }
 
-    fn drive(&self, command: &mut Command, input: &Input, force: Option<&[f64]>) -> Result<Vec<Vec<f64>>, Failed> {
-        let (n, period) = (input.len(), input.period());
+    fn drive(
+        &self,
+        command: &mut Command,
+        input: &Input,
+        samples: usize,
+        force: Option<&[f64]>,
+    ) -> Result<Vec<Vec<f64>>, Failed> {
+        let (n, period) = (samples.min(input.len()), input.period());
         let mut run = Run::new(self, input);
         let mut x = self.initial.clone();
         run.rest(&mut x);

@@ -131,8 +131,18 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn modes(&self) -> Vec<i8> {
-        // A relay starts on its upper branch; every other mode starts at rest.
-        self.list.iter().map(|m| if matches!(m, Mode::Relay(_)) { 1 } else { 0 }).collect()
+        // A relay starts on its upper branch; a mass that moves at the start slides; every other mode starts at rest.
+        let speed = match self.body {
+            Body::Chain(c) => self.machine.initial.get(c.n + self.rubbing).copied().unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let side = if speed == 0.0 { 0 } else { speed.signum() as i8 };
+        let at_start = |m: &Mode| match m {
+            Mode::Relay(_) => 1,
+            Mode::Friction => side,
+            _ => 0,
+        };
+        self.list.iter().map(at_start).collect()
     }
 
     /// Position and velocity of mass `dof`, or of the specimen.
