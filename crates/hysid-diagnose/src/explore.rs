@@ -8,10 +8,10 @@ use crate::evidence::correlation_time;
 use crate::file::DetectableRecord;
 use crate::hypothesis::{Hypothesis, Setting};
 use crate::lesson::{Done, Lesson, lesson};
-use crate::pipeline::{Hooks, Request};
 use crate::records::detectability;
+use crate::request::{Hooks, Request, words};
 use crate::screen::{Candidate, screen};
-use crate::search::{Search, words};
+use crate::search::Search;
 
 /// What was found on one calibration.
 pub struct Explored<'a, 'd> {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::data::{DataSet, held_out_blocks};
 use crate::error::DiagnoseError;
-use crate::pipeline::{Hooks, Request};
+use crate::request::{Hooks, Request};
 
 /// Most samples that the search works on where the outputs are thinned, and where they are not; a longer recording is used in windows.
 const MOST_SAMPLES: usize = 26_000;

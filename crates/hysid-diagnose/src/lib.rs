@@ -43,6 +43,7 @@ mod records;
 mod region;
 mod rehearsal;
 mod report_values;
+mod request;
 mod screen;
 mod search;
 mod second_look;
@@ -56,5 +57,5 @@ pub use column::{StandIn, stand_in};
 pub use data::{DataSet, Stretch, held_out_blocks};
 pub use error::DiagnoseError;
 pub use model::{Model, Outputs, Unknown, Values};
-
-pub use pipeline::{Diagnosis, Hooks, Options, Question, Request, diagnose};
+pub use pipeline::{Diagnosis, diagnose};
+pub use request::{Hooks, Options, Question, Request};

@@ -1,7 +1,6 @@
 //! The steps of a diagnosis, in order: intake, calibration, test, screening, refit, composition, verdict, hold-out.
 
 use hysid_plant::Simulation;
-use hysid_signal::Recording;
 
 use crate::base::NoiseKind;
 use crate::budget::{Budget, Step};
@@ -21,55 +20,11 @@ use crate::openset::uneven;
 use crate::picture::Picture;
 use crate::records::*;
 use crate::reliability::recalibrate;
+use crate::request::{Hooks, Request};
 use crate::search::{calibrate, leaves_more};
 use crate::text::number;
 use crate::verdict::{FIRM, Hypothesis as Weighed, NOT_FIRM, Support, verdict};
 use crate::weigh::*;
-
-/// Options of a diagnosis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// Level of the mismatch test.
-    pub alpha: f64,
-    /// Seed of everything random.
-    pub seed: u64,
-}
-
-/// A set of effects that the caller wants to have weighed: (mechanism, slot), such as `("coulomb_friction", "state:v")`.
-pub type Question = Vec<(String, String)>;
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { alpha: 0.01, seed: 1 }
-    }
-}
-
-/// What a diagnosis is asked.
-#[derive(Debug)]
-pub struct Request<'a> {
-    /// The user's simulation.
-    pub simulation: &'a Simulation,
-    /// Its file, for messages.
-    pub file: &'a str,
-    /// Recordings to estimate from.
-    pub estimation: &'a [Recording],
-    /// Recordings that only score; none: blocks of the estimation recordings are held out.
-    pub holdout: &'a [Recording],
-    /// Sets of effects to weigh besides those that the search finds.
-    pub questions: &'a [Question],
-    /// Options.
-    pub options: Options,
-}
-
-/// How the caller follows and limits the work.
-pub struct Hooks<'a> {
-    /// Told at the start of each step.
-    pub progress: &'a (dyn Fn(&str) + Sync),
-    /// Whether this share of the time is up: optional steps are then left out.
-    pub expired: &'a (dyn Fn(f64) -> bool + Sync),
-    /// Told once, when the input is known to be good: work of the caller's own can go on beside the search from here.
-    pub accepted: &'a (dyn Fn() + Sync),
-}
 
 /// The outcome of a diagnosis.
 #[derive(Debug, Clone)]

@@ -13,10 +13,9 @@ use crate::hold::FreeRun;
 use crate::hypothesis::{Effect, Hypothesis};
 use crate::locate;
 use crate::mechanism::number_with_unit;
-use crate::pipeline::Question;
 use crate::report_values::{reported, sentence};
+use crate::request::{Question, words};
 use crate::screen::Candidate;
-use crate::search::words;
 use crate::verdict::Support;
 use crate::weigh::Contest;
 

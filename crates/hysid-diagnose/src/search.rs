@@ -15,7 +15,7 @@ use crate::hypothesis::{Hypothesis, Key, Setting};
 use crate::mechanism::{Family, Mechanism};
 use crate::model::{Model, Values};
 use crate::openset::{OpenSet, correction};
-use crate::pipeline::{Hooks, Options, Question, Request};
+use crate::request::{Hooks, Options, Question, Request};
 use crate::screen::{Candidate, screen};
 use crate::second_look::{ODDS_AGAINST_MORE, SLOW, unlikely};
 use crate::slot::Slot;
@@ -296,11 +296,6 @@ fn fitted_key(h: &Hypothesis<'_>) -> Key {
     let mut key = h.key();
     key.push(("", format!("{:.3}", h.log_evidence)));
     key
-}
-
-/// A question as it was typed.
-pub fn words(question: &Question) -> String {
-    question.iter().map(|(m, s)| format!("{m}@{s}")).collect::<Vec<_>>().join("+")
 }
 
 #[cfg(test)]
