@@ -2,29 +2,29 @@
 
 use hysid_plant::Simulation;
 
-use crate::base::NoiseKind;
-use crate::budget::{Budget, Step};
-use crate::draw::{Sitting, picture};
+use crate::answer::draw::{Sitting, picture};
+use crate::answer::file::*;
+use crate::answer::picture::Picture;
+use crate::answer::records::*;
+use crate::answer::text::number;
+use crate::data::intake::{Intake, intake};
 use crate::error::DiagnoseError;
+use crate::experiment::fresh::gamble;
 use crate::experiment::separating;
-use crate::explore::{Explored, LESSONS, explore};
-use crate::file::*;
-use crate::firmness::{firmness, likelihoods};
-use crate::force::pushed;
-use crate::fresh::gamble;
-use crate::hold::free_run;
-use crate::hypothesis::{Hypothesis, Setting};
-use crate::intake::{Intake, intake};
-use crate::left::Left;
+use crate::model::base::NoiseKind;
+use crate::model::force::pushed;
+use crate::model::hold::free_run;
+use crate::openset::left::Left;
 use crate::openset::uneven;
-use crate::picture::Picture;
-use crate::records::*;
-use crate::reliability::recalibrate;
 use crate::request::{Hooks, Request};
+use crate::search::budget::{Budget, Step};
+use crate::search::explore::{Explored, LESSONS, explore};
+use crate::search::hypothesis::{Hypothesis, Setting};
 use crate::search::{calibrate, leaves_more};
-use crate::text::number;
+use crate::verdict::firmness::{firmness, likelihoods};
+use crate::verdict::reliability::recalibrate;
+use crate::verdict::weigh::*;
 use crate::verdict::{FIRM, Hypothesis as Weighed, NOT_FIRM, Support, verdict};
-use crate::weigh::*;
 
 /// The outcome of a diagnosis.
 #[derive(Debug, Clone)]

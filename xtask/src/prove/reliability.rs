@@ -2,7 +2,7 @@
 //!
 //! `cargo xtask prove --development --seed S --reliability` prints the table of one bank and writes its statements (`statements.csv`).
 //! `cargo xtask reliability FILE...` fits the map to the statements of several banks, each left out in turn, and prints the figures that
-//! stand in `hysid_diagnose::reliability`. Only development banks: a map that was fitted to the reporting stream would report itself.
+//! stand in `hysid_diagnose::verdict::reliability`. Only development banks: a map that was fitted to the reporting stream would report itself.
 //!
 //! The fit is a logistic regression by Newton's method with a weak normal prior (slope 0.5, everything else 0), since a bank has few statements
 //! that are not firm.
@@ -11,8 +11,8 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
-use hysid_diagnose::reliability::{FAMILY, IMITATION, MECHANISM, Map, logit};
 use hysid_diagnose::verdict::FIRM;
+use hysid_diagnose::verdict::reliability::{FAMILY, IMITATION, MECHANISM, Map, logit};
 
 use super::score::{Row, Statement, statements};
 use super::stats::calibration;

@@ -4,6 +4,8 @@
 //! its own initial state. Rows are ordered by stretch, then output, then time.
 
 mod cut;
+pub mod intake;
+mod thinning;
 mod windows;
 
 use std::borrow::Cow;
@@ -13,8 +15,8 @@ use std::sync::Arc;
 use hysid_plant::Drive;
 
 use crate::evidence::{Layout, Series};
-use crate::thinning::{step, thin};
 
+use thinning::{step, thin};
 pub use windows::held_out_blocks;
 
 /// Gaps cut a recording into stretches; shorter ones than this are left out.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
-use crate::base::Base;
+use crate::model::base::Base;
 
 /// Courses of a walk: the slowest that a Brownian motion is made of.
 pub const COURSES: usize = 16;

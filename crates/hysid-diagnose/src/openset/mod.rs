@@ -10,6 +10,7 @@
 //! MSSP 75 (2016): memory without rate needs an operator with memory, which no static term imitates.
 
 mod course;
+pub mod left;
 mod modulation;
 mod needed;
 mod signature;
@@ -22,10 +23,10 @@ use hysid_linalg::Matrix;
 use hysid_plant::Simulation;
 use hysid_select::{Criterion, Options as Selecting, select};
 
-use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
+use crate::answer::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::data::held_out_blocks;
 use crate::evidence::{Projector, Whitener, dot, norm2};
-use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
+use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 pub use needed::fitted;
 use signature::signature;
 use terms::{Kind, Term, terms};

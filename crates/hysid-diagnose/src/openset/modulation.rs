@@ -6,10 +6,10 @@
 use hysid_plant::{Expr, Input, Simulation, Slot as Place};
 use rayon::prelude::*;
 
-use crate::base::Base;
 use crate::data::DataSet;
 use crate::evidence::Whitener;
 use crate::model::Model;
+use crate::model::base::Base;
 
 /// Signals that are pushed through the simulation's tangent together.
 const TOGETHER: usize = 8;

@@ -6,9 +6,9 @@
 use hysid_plant::Simulation;
 
 use super::{Sparse, Writable};
-use crate::base::Base;
-use crate::budget::Step;
-use crate::hypothesis::{Hypothesis, Setting};
+use crate::model::base::Base;
+use crate::search::budget::Step;
+use crate::search::hypothesis::{Hypothesis, Setting};
 
 /// The correction fitted in the place of, or on top of, a set, without the terms that it does not need.
 pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable) -> Option<Hypothesis<'d>> {

@@ -1,9 +1,9 @@
 //! The signature of a correction: what the families of generic signals say of memory, rate, symmetry and side.
 
 use super::terms::{Kind, Term};
-use crate::base::Base;
+use crate::answer::file::SignatureRecord;
 use crate::evidence::{FeatureGroup, Projector, Whitener, norm2, score};
-use crate::file::SignatureRecord;
+use crate::model::base::Base;
 
 /// The signature: which families of terms see the residual.
 pub fn signature(

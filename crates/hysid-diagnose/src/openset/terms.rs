@@ -6,11 +6,11 @@ use std::sync::Arc;
 use hysid_plant::{Expr, Function, Slot as Place};
 use rayon::prelude::*;
 
-use crate::base::Base;
+use crate::answer::text::number;
 use crate::data::DataSet;
-use crate::screen::along;
+use crate::model::base::Base;
+use crate::search::screen::along;
 use crate::slot::Structure;
-use crate::text::number;
 
 /// Samples of a signal by stretch.
 type Series = Vec<Vec<f64>>;

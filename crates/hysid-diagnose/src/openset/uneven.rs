@@ -10,11 +10,11 @@
 
 use hysid_plant::Expr;
 
-use crate::base::{Base, NoiseKind};
+use crate::answer::text::number;
 use crate::evidence::{dot, norm2};
-use crate::hypothesis::Effect;
-use crate::screen::along;
-use crate::text::number;
+use crate::model::base::{Base, NoiseKind};
+use crate::search::hypothesis::Effect;
+use crate::search::screen::along;
 
 use super::modulation::Modulated;
 use super::varying::View;
@@ -123,9 +123,9 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
-    use crate::budget::Budget;
     use crate::data::DataSet;
-    use crate::hypothesis::calibrated;
+    use crate::search::budget::Budget;
+    use crate::search::hypothesis::calibrated;
 
     /// What an oscillator with dry friction, whose level is multiplied by a function of the position, looks like to a simulation that has dry friction.
     fn found(seed: u64, factor: fn(f64) -> f64, noise: f64) -> Uneven {

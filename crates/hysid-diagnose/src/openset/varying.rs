@@ -12,11 +12,11 @@ use rand_distr::{Distribution, StandardNormal};
 use super::course::{COURSES, Course, Series, Time};
 use super::modulation::{Modulated, modulated};
 use super::regress;
-use crate::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
+use crate::answer::text::number;
 use crate::evidence::{Layout, Projector, Wander, Whitener, dot, lines, norm2, score};
+use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use crate::random::generator;
-use crate::second_look::SLOW;
-use crate::text::number;
+use crate::search::second_look::SLOW;
 
 /// Lines of each parameter whose responses are taken, and of these how many are judged with a noise model of their own.
 const LINES: (usize, usize) = (4, 2);
@@ -289,8 +289,8 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
-    use crate::base::{Start, fit_simulation};
     use crate::data::DataSet;
+    use crate::model::base::{Start, fit_simulation};
     use crate::model::{Model, Values};
     use crate::openset::written::with_oscillation;
     use crate::refit::LmOptions;

@@ -174,9 +174,9 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
-    use crate::base::{NoiseKind, Start, fit_simulation};
     use crate::data::DataSet;
     use crate::evidence::{dot, norm2};
+    use crate::model::base::{NoiseKind, Start, fit_simulation};
     use crate::model::{Model, Values};
     use crate::openset::terms::terms;
     use crate::refit::LmOptions;

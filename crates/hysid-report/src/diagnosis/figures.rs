@@ -1,6 +1,6 @@
 //! The figures of a diagnosis, drawn from the series that `hysid-diagnose` gives.
 
-use hysid_diagnose::picture::{LawPicture, MapPicture, RecordPicture, Role, SpectrumPicture};
+use hysid_diagnose::answer::picture::{LawPicture, MapPicture, RecordPicture, Role, SpectrumPicture};
 
 use crate::figure::{FigureError, LogAxes, Map, Mark, Plot, Scale, Tone, envelope};
 

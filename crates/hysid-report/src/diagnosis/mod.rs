@@ -8,8 +8,8 @@
 mod figures;
 mod words;
 
-use hysid_diagnose::file::{DiagnosisFile, VerdictKind};
-use hysid_diagnose::picture::{ParameterPicture, Picture};
+use hysid_diagnose::answer::file::{DiagnosisFile, VerdictKind};
+use hysid_diagnose::answer::picture::{ParameterPicture, Picture};
 
 use crate::page::{Align, Page, Table, Tenor};
 use crate::words::{Provenance, interval, number, p_value, percent, probability};

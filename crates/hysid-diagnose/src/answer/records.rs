@@ -1,0 +1,313 @@
+//! The records of a verdict: what the fitted hypotheses say, in the form in which it is written to the file.
+
+use std::collections::BTreeMap;
+
+use hysid_plant::Simulation;
+
+use super::bootstrap::{ratio_of_rms, rms};
+use super::file::*;
+use super::locate;
+use super::report_values::{reported, sentence};
+use crate::data::DataSet;
+use crate::evidence::{FeatureGroup, detectable_amplitude};
+use crate::mechanism::number_with_unit;
+use crate::model::base::Base;
+use crate::model::hold::FreeRun;
+use crate::request::{Question, words};
+use crate::search::hypothesis::{Effect, Hypothesis};
+use crate::search::screen::Candidate;
+use crate::verdict::Support;
+use crate::verdict::weigh::Contest;
+
+pub fn by_column(simulation: &Simulation, values: &[f64]) -> BTreeMap<String, f64> {
+    simulation.outputs.iter().map(|o| o.column.clone()).zip(values.iter().copied()).collect()
+}
+
+/// The smallest effects that this recording would have shown.
+pub fn detectability(candidates: &[Candidate]) -> Vec<DetectableRecord> {
+    let count: usize = candidates.iter().map(|c| c.points.len()).sum();
+    let mut out: Vec<DetectableRecord> = candidates
+        .iter()
+        .filter_map(|c| {
+            let amplitude = c.refit.amplitudes.first()?;
+            let point = c.points.iter().filter(|p| p.norm > 0.0).max_by(|a, b| a.norm.total_cmp(&b.norm))?;
+            let group = FeatureGroup::of_norm(point.norm);
+            let unit = c
+                .refit
+                .simulation
+                .parameter(&amplitude.name)?
+                .unit
+                .as_ref()
+                .map(ToString::to_string)
+                .unwrap_or_default();
+            let smallest = detectable_amplitude(&group, 1.0, count);
+            smallest.is_finite().then(|| DetectableRecord {
+                mechanism: c.mechanism.id.into(),
+                slot: c.slot.label.clone(),
+                smallest,
+                unit,
+            })
+        })
+        .collect();
+    out.sort_by(|a, b| (&a.slot, &a.mechanism).cmp(&(&b.slot, &b.mechanism)));
+    out.dedup_by(|a, b| a.mechanism == b.mechanism && a.slot == b.slot);
+    out
+}
+
+/// The effects of the best set.
+pub fn effects(best: &Hypothesis<'_>, support: &[Support]) -> Vec<EffectRecord> {
+    let record = |(e, s): (&Effect, &Support)| {
+        let parameters = reported(&best.base, e);
+        EffectRecord {
+            mechanism: e.mechanism.id.into(),
+            family: e.mechanism.family.name().into(),
+            slot: e.slot.label.clone(),
+            probability: s.mechanism,
+            family_probability: s.family,
+            support: s.mechanism,
+            family_support: s.family,
+            concealment: e.concealment,
+            sentence: sentence(e, &parameters),
+            parameters,
+        }
+    };
+    best.effects.iter().zip(support).map(record).collect()
+}
+
+/// From when on the recordings part, where a change at one moment is among the effects: its moment to the end of the first recording.
+pub fn from_moment(effects: &[EffectRecord], data: &DataSet) -> Option<[f64; 2]> {
+    let changes = || effects.iter().filter(|e| e.mechanism == "abrupt_change");
+    let moment = changes().find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"))?;
+    let last = data.stretches.iter().rfind(|s| s.recording == 0)?;
+    Some([moment.value, last.start_s + last.len() as f64 * data.period_s])
+}
+
+/// What the recording lacks for a firmer answer about the effects of the best set.
+pub fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<String> {
+    let told = |e: &Effect| {
+        let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?;
+        let lacking = candidate.lacking.as_ref()?;
+        Some(format!("{}: for a firmer answer the recording lacks something: {lacking}", e.mechanism.id))
+    };
+    best.effects.iter().filter_map(told).collect()
+}
+
+/// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it.
+pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<AlternativeRecord> {
+    let Contest { pool, weighed, probability, winner } = *contest;
+    let mut out: Vec<AlternativeRecord> = Vec::new();
+    let mut order: Vec<usize> = (0..pool.len()).collect();
+    order.sort_by(|&a, &b| weighed[b].log_evidence.total_cmp(&weighed[a].log_evidence));
+    for i in order {
+        for e in &pool[i].effects {
+            let winning =
+                pool[winner].effects.iter().any(|w| w.mechanism.id == e.mechanism.id && w.slot.label == e.slot.label);
+            let listed = out.iter().any(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
+            if listed || (winning && kind != VerdictKind::Ambiguous) {
+                continue;
+            }
+            let total: f64 = weighed
+                .iter()
+                .zip(probability)
+                .filter(|(w, _)| w.claims.iter().any(|c| c.mechanism == e.mechanism.id && c.slot == e.slot.label))
+                .map(|(_, p)| p)
+                .sum();
+            out.push(AlternativeRecord {
+                mechanism: e.mechanism.id.into(),
+                family: e.mechanism.family.name().into(),
+                slot: e.slot.label.clone(),
+                probability: total.min(1.0),
+                evidence_gap: 2.0 * (weighed[winner].log_evidence - weighed[i].log_evidence),
+                separation: None,
+            });
+        }
+    }
+    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    out.truncate(12);
+    out
+}
+
+/// Where the strongest effect of the best set shows.
+pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Candidate]) -> Option<LocationRecord> {
+    let effect = best.effects.first();
+    let candidate = match effect {
+        Some(e) => candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?,
+        None => candidates.first()?,
+    };
+    let data = none.base.model.data();
+    let (_, r) = none.base.evidence();
+    // What the effects took away, whitened: evidence in output space.
+    let white = none.base.whitener.apply(&data.layout, &none.base.fit.residual);
+    let taken: Vec<f64> = none.base.fit.residual.iter().zip(&best.base.fit.residual).map(|(b, a)| b - a).collect();
+    let g = if best.effects.is_empty() { white } else { none.base.whitener.apply(&data.layout, &taken) };
+    let mut time_s: Vec<[f64; 2]> = Vec::new();
+    for s in &data.layout.series {
+        if data.stretches[s.stretch].recording != 0 {
+            continue;
+        }
+        let start = data.stretches[s.stretch].start_s + s.first as f64 * data.period_s;
+        for rows in locate::active_rows(s, &r, &g) {
+            let at = |row: usize| start + (row - s.rows.start) as f64 * data.row_period_s();
+            time_s.push([at(rows.start), at(rows.end.max(1) - 1)]);
+        }
+    }
+    let longest = data.layout.series.iter().max_by_key(|s| s.rows.len())?;
+    let band_hz = locate::bands(
+        &none.base.fit.residual[longest.rows.clone()],
+        &best.base.fit.residual[longest.rows.clone()],
+        data.row_period_s(),
+    );
+    let region = super::region::words(none, best).unwrap_or_else(|| "everywhere on the trajectory".into());
+    Some(LocationRecord {
+        slot: candidate.slot.label.clone(),
+        block: candidate.mechanism.block_at(&candidate.slot).name().into(),
+        time_s,
+        band_hz,
+        region,
+    })
+}
+
+/// The noise that the best model leaves, by output.
+pub fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {
+    best.base.whitener.models.iter().map(|m| m.innovation().min(m.noise_rms())).collect()
+}
+
+pub fn fits(
+    simulation: &Simulation,
+    held: &DataSet,
+    before: Option<&FreeRun>,
+    after: Option<&FreeRun>,
+    seed: u64,
+    blocks: bool,
+) -> Vec<FitRecord> {
+    let mut out = Vec::new();
+    for (r, name) in held.recordings.iter().enumerate() {
+        for (o, output) in simulation.outputs.iter().enumerate() {
+            let errors = |run: &FreeRun| -> Vec<f64> {
+                held.layout
+                    .series
+                    .iter()
+                    .filter(|s| s.output == o && held.stretches[s.stretch].recording == r)
+                    .flat_map(|s| s.rows.clone())
+                    .filter(|&row| before.is_none_or(|b| b.scored[row]) && after.is_none_or(|a| a.scored[row]))
+                    .map(|row| held.y[row] - run.prediction[row])
+                    .collect()
+            };
+            let b = before.map(errors);
+            let a = after.map(errors);
+            let rmse_before = b.as_ref().map(|e| rms(e)).and_then(finite);
+            let rmse_after = a.as_ref().map(|e| rms(e)).and_then(finite);
+            let ratio = match (&a, &b) {
+                (Some(a), Some(b)) => Some(ratio_of_rms(a, b, seed)),
+                _ => None,
+            };
+            out.push(FitRecord {
+                recording: if blocks { format!("{name}: held-out blocks") } else { name.clone() },
+                output: output.column.clone(),
+                rmse_before,
+                rmse_after,
+                ratio: ratio.and_then(|r| finite(r.value)),
+                ratio_low: ratio.and_then(|r| finite(r.low)),
+                ratio_high: ratio.and_then(|r| finite(r.high)),
+                rmse_black_box: None,
+            });
+        }
+    }
+    out
+}
+
+pub fn calibrated(base: &Base<'_>, simulation: &Simulation) -> Vec<ParameterRecord> {
+    base.intervals()
+        .into_iter()
+        .filter_map(|(name, value, low, high, _)| {
+            let p = simulation.parameter(&name)?;
+            let unit = p.unit.as_ref().map(ToString::to_string).unwrap_or_default();
+            Some(ParameterRecord { name, value, low: finite(low), high: finite(high), unit })
+        })
+        .collect()
+}
+
+/// Parameters of the calibrated simulation that stand at a bound or far from what the user gave.
+pub fn absorbing(base: &Base<'_>, simulation: &Simulation) -> Vec<String> {
+    let mut out = Vec::new();
+    for (name, value, low, high, at_bound) in base.intervals() {
+        let Some(p) = simulation.parameter(&name) else { continue };
+        let unit = p.unit.as_ref();
+        if at_bound {
+            out.push(format!("parameter `{name}` of the recalibrated simulation stands at a bound ({}): it may be absorbing something", number_with_unit(value, unit)));
+        } else if p.value != 0.0
+            && (value / p.value > 2.0 || value / p.value < 0.5)
+            && (p.value < low || p.value > high)
+        {
+            out.push(format!(
+                "parameter `{name}` of the recalibrated simulation is {}, the file says {}",
+                number_with_unit(value, unit),
+                number_with_unit(p.value, unit)
+            ));
+        }
+    }
+    out
+}
+
+/// The verdict in a sentence or two; `varying` says what varies, where a correction without a name says so, `unequal` which strength may depend on
+/// the motion.
+pub fn summary(file: &DiagnosisFile, varying: Option<&str>, unequal: Option<&str>) -> String {
+    let sentences = || file.effects.iter().map(|e| e.sentence.clone()).collect::<Vec<_>>().join(" ");
+    let rivals = || {
+        file.alternatives
+            .iter()
+            .take(3)
+            .map(|a| format!("{} at {} ({:.0} %)", a.mechanism, a.slot, 100.0 * a.probability))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    match file.verdict {
+        VerdictKind::NoSignificantMismatch => {
+            "The recalibrated simulation and the recording differ by no more than the noise.".into()
+        }
+        VerdictKind::Named => sentences(),
+        VerdictKind::Family => {
+            let families: Vec<&str> = file.effects.iter().map(|e| e.family.as_str()).collect();
+            format!("The family is firm ({}), the member is not. The likeliest: {}", families.join(", "), sentences())
+        }
+        VerdictKind::Ambiguous if file.effects.is_empty() => {
+            "Something is missing, and nothing that was fitted explains it.".into()
+        }
+        VerdictKind::Ambiguous => {
+            let or = unequal.map_or_else(String::new, |u| format!(", or a law that the catalogue does not have ({u})"));
+            format!("Several explanations remain: {}{or}. The likeliest set: {}", rivals(), sentences())
+        }
+        VerdictKind::NotInCatalogue => match varying.or(unequal) {
+            Some(varying) => {
+                format!(
+                    "Something is missing that no mechanism of the catalogue explains. What it looks like: {varying}."
+                )
+            }
+            None => {
+                "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it."
+                    .into()
+            }
+        },
+    }
+}
+
+/// What became of the sets that the caller wanted weighed.
+pub fn answers(pool: &[Hypothesis<'_>], questions: &[Question]) -> Vec<String> {
+    let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    questions
+        .iter()
+        .filter_map(|q| {
+            let mut key: Vec<(&str, &str)> = q.iter().map(|(m, s)| (m.as_str(), s.as_str())).collect();
+            key.sort_unstable();
+            let h = pool.iter().find(|h| h.key().iter().map(|(m, s)| (*m, s.as_str())).eq(key.iter().copied()))?;
+            let values: Vec<String> = h.effects.iter().map(|e| sentence(e, &reported(&h.base, e))).collect();
+            Some(format!(
+                "considered {}: log evidence {:.1} below the best set that was fitted, {:.1} above none. {}",
+                words(q),
+                top - h.log_evidence,
+                h.log_evidence - pool[0].log_evidence,
+                values.join(" ")
+            ))
+        })
+        .collect()
+}

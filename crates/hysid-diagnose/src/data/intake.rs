@@ -1,0 +1,91 @@
+//! Intake: the recordings of a request, checked, as one data set to fit and one that only scores.
+
+use std::collections::BTreeSet;
+
+use super::{DataSet, held_out_blocks};
+use crate::error::DiagnoseError;
+use crate::request::{Hooks, Request};
+
+/// Most samples that the search works on where the outputs are thinned, and where they are not; a longer recording is used in windows.
+const MOST_SAMPLES: usize = 26_000;
+const MOST_ROWS: usize = 12_000;
+
+/// What a diagnosis works on.
+pub struct Intake {
+    /// To calibrate, search and judge on: in windows where the recordings are long, with fewer rows where the outputs are slow.
+    pub data: DataSet,
+    /// The hold-out: scores, and nothing else.
+    pub held: DataSet,
+    /// What was done to the recordings, for people.
+    pub notes: Vec<String>,
+}
+
+/// Reads a request.
+///
+/// # Errors
+/// A level that is none, an output that nothing moves, recordings that do not fit the simulation, a hold-out that was to be fitted.
+pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, DiagnoseError> {
+    let alpha = request.options.alpha;
+    if !(alpha > 0.0 && alpha < 0.5) {
+        return Err(DiagnoseError::Option {
+            option: "--alpha",
+            given: alpha.to_string(),
+            allowed: "above 0 and below 0.5",
+        });
+    }
+    let simulation = request.simulation;
+    dead_outputs(request)?;
+    (hooks.progress)("reading the recordings");
+    let free = simulation.parameters.iter().filter(|p| !p.fixed).count();
+    let all = DataSet::new(simulation, request.estimation, free)?;
+    let (full, held) = if request.holdout.is_empty() {
+        split_blocks(&all)
+    } else {
+        if let Some(same) = request
+            .holdout
+            .iter()
+            .find(|h| request.estimation.iter().any(|e| e.channels() == h.channels() && e.clock() == h.clock()))
+        {
+            return Err(DiagnoseError::SameData(same.name().to_owned()));
+        }
+        (all, DataSet::new(simulation, request.holdout, 0)?)
+    };
+    let mut notes = full.notes.clone();
+    if request.holdout.is_empty() {
+        notes.push("no hold-out recording was given: blocks of the recordings were held out and score the fit".into());
+    }
+    let data = full.within(if full.own_step() > 1 { MOST_SAMPLES } else { MOST_ROWS }).thinned();
+    notes.extend(data.notes.iter().filter(|n| !full.notes.contains(n)).cloned());
+    Ok(Intake { data, held, notes })
+}
+
+/// An output that nothing moves cannot be diagnosed.
+fn dead_outputs(request: &Request<'_>) -> Result<(), DiagnoseError> {
+    for o in &request.simulation.outputs {
+        let symbols = o.expression.symbols();
+        let alive = symbols.iter().any(|s| {
+            request.simulation.state(s).is_some()
+                || request.simulation.input(s).is_some()
+                || s == "t"
+                || request.simulation.parameter(s).is_some()
+        });
+        if !alive {
+            return Err(DiagnoseError::DeadOutput { file: request.file.to_owned(), column: o.column.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// Blocks of the estimation recordings as hold-out.
+fn split_blocks(all: &DataSet) -> (DataSet, DataSet) {
+    let weights = held_out_blocks(&all.layout, &all.y);
+    let mut out = BTreeSet::new();
+    for s in &all.layout.series {
+        for (n, row) in s.rows.clone().enumerate() {
+            if weights[row] == 0.0 {
+                out.insert((s.stretch, s.first + n));
+            }
+        }
+    }
+    (all.keep(|s, n, _| !out.contains(&(s, n))), all.keep(|s, n, _| out.contains(&(s, n))))
+}

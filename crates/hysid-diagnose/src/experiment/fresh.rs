@@ -1,0 +1,218 @@
+//! Simulations on inputs that were not recorded: what they answer, and what is lost there if the set that is written is not the true one.
+//!
+//! A set of effects that was fitted to a small residual may do anything where the recording has not been: a spring that pushes, on a drive that
+//! nothing holds, is small until the drive goes there. Sets that are as likely tell how much hangs on the choice: should one of them be the
+//! truth, writing the likeliest set brings its distance from the truth, and writing nothing brings the baseline's. It is written where its
+//! expected loss is well below that of writing nothing. Inputs are the recorded ones mirrored (each about the middle of its range) and reversed in
+//! time: they have the same levels and the same band, and lead elsewhere. They begin as they were recorded and fade over, so that nothing hangs on
+//! how states begin.
+//!
+//! Reference: J. O. Berger, Statistical Decision Theory and Bayesian Analysis, 2nd ed., Springer (1985), ch. 4.
+
+use hysid_plant::{Drive, Initial, Simulation};
+
+use crate::data::DataSet;
+use crate::model::base::Base;
+use crate::model::{Model, Values};
+use crate::search::hypothesis::Setting;
+use crate::verdict::weigh::Contest;
+
+/// Share that a set may have on average of what it and nothing would lose. Below a half: the truth may be none of the sets that were fitted.
+const WORTH: f64 = 0.3;
+/// What is left out of a fresh input before it is judged: one part of so many.
+const RUN_IN: usize = 5;
+/// Rivals that are asked, and the least probability of one.
+const RIVALS: usize = 8;
+const LIKELY: f64 = 0.005;
+
+/// The fitted simulation as it starts anew: where the document says, free states at zero.
+pub fn started(base: &Base<'_>) -> Simulation {
+    let mut document = base.document();
+    document.states.iter_mut().filter(|s| s.initial == Initial::Free).for_each(|s| s.initial = Initial::Number(0.0));
+    document
+}
+
+/// An input as a data set, with what a simulation answers to it as its outputs; `None` where it diverges.
+pub fn answered(document: &Simulation, drive: &Drive, substeps: usize) -> Option<DataSet> {
+    let silent = vec![vec![0.0; drive.len()]; document.outputs.len()];
+    let empty = DataSet::of_drive(drive.clone(), silent, drive.period_s());
+    let mut fixed = document.clone();
+    fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
+    let model = Model::new(&fixed, &empty, &[], substeps).ok()?;
+    let y = model.predict(&model.theta(&Values::default()))?;
+    Some(empty.with_outputs(y))
+}
+
+/// The squared distance of two answers to one input after the run-in, each output in units of its noise.
+fn apart(a: &DataSet, b: &DataSet, noise: &[f64]) -> f64 {
+    let outputs = a.stretches[0].outputs.iter().zip(&b.stretches[0].outputs).zip(noise);
+    let squares = outputs.map(|((a, b), noise)| {
+        a.iter().zip(b).skip(a.len() / RUN_IN).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / noise.powi(2)
+    });
+    squares.sum()
+}
+
+/// The share that writing a set has of what is lost by it and by writing nothing: 0 where nothing is lost by the set, a half where both lose the
+/// same; `None` where neither loses anything.
+fn share(written: f64, not: f64) -> Option<f64> {
+    let share = written / (written + not);
+    share.is_finite().then_some(share)
+}
+
+/// The expected share of the loss that `set` has on this drive, if the truth is `set` with a probability of `own` and one of the rivals with
+/// theirs; `noise` is that of each output. Each truth has its share, so that a rival which goes far astray there does not outweigh all the others.
+/// One where the set diverges, `None` where no set differs from the simulation as it is.
+fn expected_share(
+    nothing: &Simulation,
+    (own, set): (f64, &Simulation),
+    rivals: &[(f64, Simulation)],
+    drive: &Drive,
+    substeps: usize,
+    noise: &[f64],
+) -> Option<f64> {
+    let baseline = answered(nothing, drive, substeps)?;
+    let Some(best) = answered(set, drive, substeps) else { return Some(1.0) };
+    let truths = rivals.iter().filter_map(|(probability, rival)| {
+        // A rival that diverges where the set does not is refuted by any machine that survives the input.
+        let truth = answered(rival, drive, substeps)?;
+        share(apart(&best, &truth, noise), apart(&baseline, &truth, noise)).map(|share| (*probability, share))
+    });
+    let own = share(0.0, apart(&baseline, &best, noise)).map(|share| (own, share));
+    let (all, of_set) =
+        own.into_iter().chain(truths).fold((0.0, 0.0), |(all, of), (p, share)| (all + p, of + p * share));
+    (all > 0.0).then(|| of_set / all)
+}
+
+/// The expected share of the loss that the winner has where it is too large for the winner to be written: that would be a gamble.
+pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
+    let Contest { pool, probability, winner, .. } = *contest;
+    let recorded = &setting.data.stretches.iter().max_by_key(|s| s.len())?.drive;
+    let mut rivals: Vec<usize> =
+        (1..pool.len()).filter(|&i| i != winner && probability[i] > LIKELY && !pool[i].effects.is_empty()).collect();
+    rivals.sort_by(|&a, &b| probability[b].total_cmp(&probability[a]));
+    let rivals: Vec<(f64, Simulation)> =
+        rivals.into_iter().take(RIVALS).map(|i| (probability[i], started(&pool[i].base))).collect();
+    if rivals.is_empty() {
+        return None;
+    }
+    let (nothing, best) = (started(&pool[0].base), started(&pool[winner].base));
+    let noise: Vec<f64> = pool[winner].base.whitener.models.iter().map(|m| m.noise_rms()).collect();
+    let changes: [fn(&[f64]) -> Vec<f64>; 2] = [mirror_image, reversed];
+    changes
+        .into_iter()
+        .filter_map(|change| {
+            let inputs = recorded.inputs().iter().map(|u| faded(u, &change(u))).collect();
+            let drive = Drive::new(recorded.start_s(), recorded.period_s(), recorded.len(), inputs).ok()?;
+            expected_share(&nothing, (probability[winner], &best), &rivals, &drive, setting.substeps, &noise)
+        })
+        .max_by(f64::total_cmp)
+        .filter(|loss| *loss > WORTH)
+}
+
+/// The first series, which gives way to the second over the first half of the run-in: a start is as it was recorded.
+fn faded(from: &[f64], to: &[f64]) -> Vec<f64> {
+    let length = (from.len() / (2 * RUN_IN)).max(1) as f64;
+    let share = |n: usize| (n as f64 / length).min(1.0);
+    from.iter().zip(to).enumerate().map(|(n, (a, b))| a + share(n) * (b - a)).collect()
+}
+
+/// A series from its end to its beginning.
+fn reversed(u: &[f64]) -> Vec<f64> {
+    u.iter().rev().copied().collect()
+}
+
+/// A series about the middle of its range.
+fn mirror_image(u: &[f64]) -> Vec<f64> {
+    let (low, high) = u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    u.iter().map(|x| low + high - x).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that nothing holds, pushed one way first, with this damping and a further force.
+    fn drive(damping: f64, force: &str) -> Simulation {
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_N\"\n[parameters]\nb = {{ value = {damping}, min = 0.0, max = 9.0 }}\n\
+             [states]\nq = {{ derivative = \"w\", initial = 0.0 }}\nw = {{ derivative = \"u - b*w{force}\", initial = 0.0 }}\n\
+             [outputs]\nq_m = \"q\"\n"
+        );
+        Simulation::parse(&text, "drive").unwrap()
+    }
+
+    fn pushed() -> Drive {
+        let u = (0..600).map(|n| if (n / 100) % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        Drive::new(0.0, 0.01, 600, vec![u]).unwrap()
+    }
+
+    /// Of writing a set, where the simulation as it is has a damping of 0.5.
+    fn loss(own: f64, set: &Simulation, rivals: &[(f64, Simulation)]) -> Option<f64> {
+        expected_share(&drive(0.5, ""), (own, set), rivals, &pushed(), 4, &[1.0])
+    }
+
+    #[test]
+    fn nothing_is_lost_where_all_say_the_same_and_more_than_by_nothing_on_the_wrong_side() {
+        let same = [(0.4, drive(0.6, ""))];
+        assert!(loss(0.6, &drive(0.6, ""), &same).unwrap() < 1e-20);
+        // The truth for certain is the rival: on its side of the simulation as it is a set is better than nothing, on the other it is worse.
+        assert!(loss(0.0, &drive(0.6, ""), &[(1.0, drive(0.7, ""))]).unwrap() < 0.5);
+        assert!(loss(0.0, &drive(0.4, ""), &[(1.0, drive(0.6, ""))]).unwrap() > 0.5);
+        // Neither differs from the simulation as it is.
+        assert_eq!(loss(0.5, &drive(0.5, ""), &[(0.5, drive(0.5, ""))]), None);
+    }
+
+    #[test]
+    fn the_likelier_a_set_the_less_is_lost_by_it() {
+        let of = |own: f64| loss(own, &drive(0.6, ""), &[(1.0 - own, drive(0.5, " - 0.3*q*abs(q)"))]).unwrap();
+        let losses: Vec<f64> = [0.1, 0.3, 0.5, 0.7, 0.9].into_iter().map(of).collect();
+        assert!(losses.windows(2).all(|w| w[1] < w[0]), "{losses:?}");
+        assert!(losses[0] > WORTH && losses[4] < WORTH, "{losses:?}");
+    }
+
+    #[test]
+    fn a_spring_that_pushes_where_the_recording_was_not_is_a_gamble() {
+        let rivals = [(0.5, drive(0.55, ""))];
+        assert!(loss(0.5, &drive(0.51, " + 0.4*max(q, 0)"), &rivals).unwrap() > WORTH);
+        // Where it blows up.
+        assert_eq!(loss(0.5, &drive(0.51, " + 4e9*max(q, 0)"), &rivals), Some(1.0));
+        // A rival that does is no reason against a set.
+        assert_eq!(loss(0.5, &drive(0.55, ""), &[(0.5, drive(0.51, " + 4e9*max(q, 0)"))]), Some(0.0));
+    }
+
+    #[test]
+    fn an_unlikely_rival_that_goes_far_astray_does_not_outweigh_the_rest() {
+        let astray = loss(0.9, &drive(0.6, ""), &[(0.1, drive(0.5, " + 0.9*max(q, 0)"))]).unwrap();
+        assert!(astray < WORTH, "{astray}");
+    }
+
+    /// A lag at the input that begins settled, and one of the sensor that begins at zero, say the same once the start is forgotten.
+    #[test]
+    fn how_a_state_begins_is_no_part_of_the_loss() {
+        let stable = |states: &str, output: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_N\"\n[parameters]\nb = {{ value = 9.0, min = 0.0, max = 99.0 }}\n\
+                 [states]\n{states}\n[outputs]\nq_m = \"{output}\"\n"
+            );
+            Simulation::parse(&text, "stable").unwrap()
+        };
+        let nothing = stable("q = { derivative = \"u - b*q\", initial = 0.0 }", "q");
+        let lags = [
+            "q = { derivative = \"s - b*q\", initial = 0.0 }\ns = { derivative = \"20*(u - s)\", initial = 1.0 }",
+            "q = { derivative = \"u - b*q\", initial = 0.0 }\ns = { derivative = \"20*(q - s)\", initial = 0.0 }",
+        ];
+        let (input, sensor) = (stable(lags[0], "q"), stable(lags[1], "s"));
+        let of = expected_share(&nothing, (0.5, &input), &[(0.5, sensor)], &pushed(), 4, &[1.0]).unwrap();
+        assert!(of < 1e-6, "{of}");
+    }
+
+    #[test]
+    fn a_fresh_input_begins_as_it_was_recorded() {
+        let recorded: Vec<f64> = (0..100).map(|n| f64::from(n) + 1.0).collect();
+        for change in [mirror_image, reversed] {
+            let fresh = faded(&recorded, &change(&recorded));
+            assert_eq!(fresh[0], recorded[0]);
+            assert_eq!(fresh[100 / RUN_IN..], change(&recorded)[100 / RUN_IN..]);
+        }
+    }
+}

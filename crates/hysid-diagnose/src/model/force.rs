@@ -1,0 +1,103 @@
+//! The ways by which an unknown force or flow reaches the outputs of a simulation: its equations linearised along its trajectory.
+//!
+//! A force enters where the catalogue's disturbances do: the derivative of a velocity, or of what is stored. The equations are linearised at
+//! instants that are spread over the recordings, and each coefficient's mean is taken over the middle half of the instants: where dry
+//! friction holds for some of them, or its smoothed sign is steep, the moving ones decide. The error of a simulation that follows the recorded input
+//! has the response of the simulation as it is: a loop that the simulation contains is closed in it, one behind the recorded input is not.
+
+use hysid_plant::Simulation;
+
+use super::Model;
+use crate::evidence::ForcePath;
+use crate::slot::{Place, Structure, Target};
+
+/// Instants at which the equations are linearised.
+const INSTANTS: usize = 24;
+/// Most states at which a force may enter.
+const MOST: usize = 3;
+
+/// Names of the states whose derivative an unknown force or flow may enter.
+pub fn pushed(simulation: &Simulation) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for slot in Structure::of(simulation).slots.iter().filter(|s| s.place == Place::Disturbance) {
+        if let Target::Derivatives(states) = &slot.target {
+            names.extend(states.iter().map(|(name, _)| name.clone()));
+        }
+    }
+    names.truncate(MOST);
+    names
+}
+
+/// The ways from a force at each of the `pushed` states to each output.
+pub fn force_paths(model: &Model<'_>, theta: &[f64], pushed: &[String]) -> Vec<Vec<ForcePath>> {
+    let simulation = model.simulation();
+    let n = simulation.states.len();
+    let entries: Vec<usize> =
+        pushed.iter().filter_map(|name| simulation.states.iter().position(|s| s.name == *name)).collect();
+    if entries.is_empty() {
+        return Vec::new();
+    }
+    let points = model.linearised(theta, INSTANTS);
+    if points.is_empty() {
+        return Vec::new();
+    }
+    let a: Vec<f64> = (0..n * n).map(|i| middle(points.iter().map(|p| p.a[i]))).collect();
+    let c: Vec<f64> = (0..n * simulation.outputs.len()).map(|i| middle(points.iter().map(|p| p.c[i]))).collect();
+    let period_s = model.data().row_period_s();
+    c.chunks_exact(n)
+        .map(|c| entries.iter().filter_map(|&entry| ForcePath::held(&a, entry, c, period_s)).collect())
+        .collect()
+}
+
+/// The mean of the middle half.
+fn middle(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+    all.sort_by(f64::total_cmp);
+    let quarter = all.len() / 4;
+    let half = &all[quarter..all.len() - quarter];
+    half.iter().sum::<f64>() / half.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::DataSet;
+    use crate::model::Values;
+    use hysid_plant::Drive;
+
+    /// A drive with dry friction that is pushed to and fro, sticking for part of the time; the state of a loop where there is one.
+    fn paths(force: &str) -> Vec<Vec<ForcePath>> {
+        let text = format!(
+            "[time]\nperiod_s = 0.05\n[inputs]\nu = \"u_Nm\"\n[parameters]\nb = {{ value = 0.5, min = 0.0 }}\n[states]\nq = {{ derivative = \"w\", initial = 0.0 }}\nw = {{ derivative = \"({force})/2\", initial = 0.0 }}\n[outputs]\nq_rad = \"q\"\n"
+        );
+        let simulation = Simulation::parse(&text, "drive.sim.toml").unwrap();
+        let u: Vec<f64> = (0..600).map(|n| 3.0 * (n as f64 * 0.07).sin()).collect();
+        let drive = Drive::new(0.0, 0.05, u.len(), vec![u.clone()]).unwrap();
+        let data = DataSet::of_drive(drive, vec![vec![0.0; u.len()]], 0.05);
+        let model = Model::new(&simulation, &data, &["q".into(), "w".into()], 2).unwrap();
+        let names = pushed(&simulation);
+        assert_eq!(names, ["w"]);
+        force_paths(&model, &model.theta(&Values::default()), &names)
+    }
+
+    fn by_hand(stiffness: f64) -> Vec<Vec<ForcePath>> {
+        vec![vec![ForcePath::held(&[0.0, 1.0, -stiffness, -0.25], 1, &[1.0, 0.0], 0.05).unwrap()]]
+    }
+
+    #[test]
+    fn a_drive_with_friction_answers_as_it_does_while_it_moves() {
+        assert_eq!(paths("u - b*w - sign(w)"), by_hand(0.0));
+    }
+
+    #[test]
+    fn a_loop_in_the_simulation_is_closed() {
+        assert_eq!(paths("8*(u - q) - b*w"), by_hand(4.0));
+    }
+
+    #[test]
+    fn moments_of_sticking_do_not_count() {
+        let values = [1.0, 1.0, 1e6, 1.0, f64::NAN, 1.0, -1e6, 1.0, 1.0];
+        assert_eq!(middle(values.into_iter()), 1.0);
+        assert_eq!(middle(std::iter::empty()), 0.0);
+    }
+}

@@ -1,0 +1,147 @@
+//! What is left of the winning set's residual: whether something significant is, whether generic terms find it, and whether the set is then only
+//! an imitation of a law that the catalogue does not have.
+
+use super::{OpenSet, fitted};
+use crate::answer::file::finite;
+use crate::answer::file::{CorrectionRecord, RemainingRecord};
+use crate::answer::records::noise_floor;
+use crate::evidence::SurrogateTest;
+use crate::search::Search;
+use crate::search::budget::Step;
+use crate::search::hypothesis::{Hypothesis, block_score};
+use crate::search::second_look::{ODDS_AGAINST, ODDS_AGAINST_MORE, unlikely};
+use crate::verdict::firmness::is_a_spectrum;
+use crate::verdict::weigh::better_by_chance;
+use crate::verdict::{FIRM, Support};
+
+/// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
+const BETTER: f64 = 0.97;
+/// Probability of so much better a prediction of the blocks by chance, below which a correction is written into the simulation. The evidence
+/// has found it by then; the blocks only have to bear it out.
+const BY_CHANCE: f64 = 0.05;
+/// Share of a set's evidence that generic terms may add to it, and log evidence by which they may beat it alone, before it is an imitation.
+/// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
+const AS_MUCH: f64 = 0.5;
+const FAR_MORE: f64 = 5.0;
+
+/// What is left of a set's residual.
+pub struct Left {
+    /// The surrogate test of the residual; `None` where the set is empty or there was no time.
+    test: Option<SurrogateTest>,
+    /// Generic terms for the residual; `None` where no mismatch is significant or no term is chosen.
+    open: Option<OpenSet>,
+    /// The same in place of the set, where that explains far more.
+    instead: Option<OpenSet>,
+    /// Whether generic terms explain so much that the set is an imitation.
+    pub foreign: bool,
+    /// Whether the set is a sum of relaxations, which stands for a memory with many time scales.
+    pub spectrum: bool,
+    /// Whether something significant is left.
+    pub imperfect: bool,
+    alpha: f64,
+}
+
+impl Left {
+    /// Of the `winner` of a pool whose first set is the simulation without effects.
+    pub fn of(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize, significant: bool) -> Self {
+        let (best, none) = (&pool[winner], &pool[0]);
+        let alpha = search.options.alpha;
+        let budget = search.setting.budget;
+        let test = (winner > 0 && !budget.omits(Step::Remains)).then(|| search.remains(best));
+        let open = if significant { search.open(best) } else { None };
+        let seen = open.as_ref().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
+        let explained = best.log_evidence - none.log_evidence;
+        let spectrum = is_a_spectrum(best);
+        let generic = if winner > 0 { search.open(none) } else { None };
+        let outdone = |o: &OpenSet| unlikely(o, ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
+        let outdone = generic.as_ref().is_some_and(outdone);
+        let foreign = winner > 0 && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
+        // What was not looked at is not known to be nothing.
+        let significant = |t: &SurrogateTest| t.p_value < alpha;
+        let imperfect = winner > 0 && (foreign || spectrum || seen.is_some() || test.as_ref().is_none_or(significant));
+        // What is told of an imitation is what it imitates, where that is more than what it leaves.
+        let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
+        let instead = generic.filter(|g| spectrum || (outdone && g.gain > both));
+        Self { test, open, instead, foreign, spectrum, imperfect, alpha }
+    }
+
+    /// As it is reported; `None` where it was not looked at.
+    pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> Option<RemainingRecord> {
+        let p = self.test.as_ref()?.p_value;
+        Some(RemainingRecord {
+            p_value: p.min(self.open.as_ref().map_or(1.0, |o| unlikely(o, ODDS_AGAINST_MORE))),
+            share: share(&pool[winner], &pool[0]),
+        })
+    }
+
+    /// Whether the mismatch is none of the catalogue: no set stands and a correction does, the set is an imitation, or most of the mismatch
+    /// is left. An effect that is really there is still named; what most of the mismatch is decides.
+    pub fn is_outside(&self, support: &[Support], remaining: Option<&RemainingRecord>) -> bool {
+        let Some(remaining) = remaining else { return self.open.as_ref().is_some_and(|o| self.stands(o)) };
+        let helps = self.open.as_ref().is_some_and(|o| o.block_ratio < BETTER);
+        let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
+        self.foreign || self.spectrum || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
+    }
+
+    /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
+    /// evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool):
+    /// three or four blocks tell little of a mismatch far below the noise, so they need not rule out chance where the evidence does.
+    pub fn modelled<'d>(
+        &self,
+        search: &Search<'_, 'd>,
+        pool: &[Hypothesis<'d>],
+        winner: usize,
+        otherwise: usize,
+    ) -> Option<Hypothesis<'d>> {
+        // Where a parameter walks, another recording sees another walk: functions of the time that follow this one are no use there.
+        if self.told().is_some_and(|o| o.words.is_some() && o.writable.is_none()) {
+            return None;
+        }
+        let setting = &search.setting;
+        let instead = if winner > 0 { search.open(&pool[0]) } else { None };
+        let best = [(winner, self.open.as_ref()), (0, instead.as_ref())]
+            .into_iter()
+            .filter_map(|(i, open)| {
+                let (parent, open) = (&pool[i], open?);
+                Some((fitted(setting, parent, open.writable.as_ref()?)?, self.stands_by_evidence(open)))
+            })
+            .max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))?;
+        let (best, sure) = best;
+        let (_, before) = block_score(setting, &pool[otherwise])?;
+        let (_, after) = block_score(setting, &best)?;
+        let better = after.iter().sum::<f64>() < before.iter().sum::<f64>();
+        ((sure && better) || better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
+    }
+
+    /// The correction that is told: in place of the set, or of what it leaves.
+    fn told(&self) -> Option<&OpenSet> {
+        self.instead.as_ref().or(self.open.as_ref())
+    }
+
+    /// Whether a correction is beyond doubt: on blocks that it was not fitted to, or by evidence that noise has nowhere. A mismatch far below the
+    /// noise never shows on blocks.
+    fn stands(&self, open: &OpenSet) -> bool {
+        open.block_ratio < BETTER || self.stands_by_evidence(open)
+    }
+
+    /// Whether a correction gains more evidence than noise has anywhere, and helps on blocks.
+    fn stands_by_evidence(&self, open: &OpenSet) -> bool {
+        unlikely(open, ODDS_AGAINST) < self.alpha
+    }
+
+    /// The correction, where it models something that is left and helps where it was not fitted, with what it says in words.
+    pub fn believed(self) -> Option<(CorrectionRecord, Option<String>)> {
+        let wanted = self.imperfect || self.test.is_none();
+        let open = self.told().filter(|o| wanted && self.stands(o))?;
+        Some((CorrectionRecord { ratio: finite(open.block_ratio), ..open.record.clone() }, open.words.clone()))
+    }
+}
+
+/// Share of the mismatch, above the noise, that a set leaves.
+fn share(best: &Hypothesis<'_>, none: &Hypothesis<'_>) -> f64 {
+    let layout = &best.base.model.data().layout;
+    let noise = noise_floor(best);
+    let left = |e: &[f64]| layout.rms(e).iter().zip(&noise).map(|(r, n)| (r * r - n * n).max(0.0)).sum::<f64>();
+    let share = (left(&best.base.fit.residual) / left(&none.base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
+    if share.is_finite() { share } else { 0.0 }
+}

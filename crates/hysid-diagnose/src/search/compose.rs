@@ -1,0 +1,381 @@
+//! Composition of effects: pairs found together, a beam over sets, backward drops and swaps.
+
+use rayon::prelude::*;
+
+use super::assemble::{Part, assemble, complete, without};
+use super::budget::Step;
+use super::finer::finer;
+use super::fitting::{HOPELESS, refit_all};
+use super::hypothesis::{Effect, Hypothesis, Key, Setting};
+use super::joint::pairs;
+use super::screen::Candidate;
+use crate::mechanism::Mechanism;
+
+/// The candidates worth a refit: the best by score, at most `most`, and one for each slot and family that is not far behind.
+pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
+    let Some(top) = candidates.first().map(Candidate::score) else { return Vec::new() };
+    let mut list: Vec<&Candidate> = Vec::new();
+    for (i, c) in candidates.iter().enumerate() {
+        let fresh = !list.iter().any(|l| l.mechanism.family == c.mechanism.family && l.slot.label == c.slot.label);
+        let near = c.score() > top - 40.0 && c.score() > 0.0;
+        if i < most || (fresh && near && list.len() < most + 6) {
+            list.push(c);
+        }
+    }
+    // Siblings of the best must be heard: the verdict turns on them.
+    if let Some(best) = candidates.first() {
+        for c in candidates {
+            if rivals(best.mechanism, c.mechanism) && c.slot.label == best.slot.label {
+                include(&mut list, c);
+            }
+        }
+    }
+    list
+}
+
+/// Adds a candidate that is not in the list yet.
+fn include<'c>(list: &mut Vec<&'c Candidate>, c: &'c Candidate) {
+    if !list.iter().any(|l| std::ptr::eq(*l, c)) {
+        list.push(c);
+    }
+}
+
+/// Whether two mechanisms are easily taken for each other.
+fn rivals(a: &Mechanism, b: &Mechanism) -> bool {
+    let names = |a: &Mechanism, b: &Mechanism| a.contains.contains(&b.id) || a.confusable.contains(&b.id);
+    a.family == b.family || a.family.twin() == Some(b.family) || names(a, b) || names(b, a)
+}
+
+/// Rivals that are heard at other slots than that of the effect whose rivals they are.
+const ELSEWHERE: usize = 3;
+/// Rivals that are fitted to the end after the best single effect is known.
+const SECOND_HEARING: usize = 4;
+
+/// The candidates that are easily taken for an effect: all at its slot, the best few at others.
+fn rivals_of<'c>(effect: &Effect, candidates: &'c [Candidate]) -> Vec<&'c Candidate> {
+    let (here, elsewhere): (Vec<&Candidate>, Vec<&Candidate>) = candidates
+        .iter()
+        .filter(|c| rivals(effect.mechanism, c.mechanism))
+        .partition(|c| c.slot.label == effect.slot.label);
+    here.into_iter().chain(elsewhere.into_iter().take(ELSEWHERE)).collect()
+}
+
+/// What is easily taken for the best single effect of a pool and was not fitted yet, or given up after a few iterations.
+///
+/// `given` are statements that were heard to the end.
+pub fn unheard<'c>(pool: &[Hypothesis<'_>], candidates: &'c [Candidate], given: &[Key]) -> Vec<&'c Candidate> {
+    let Some(best) = best_of_size(pool, 1).map(|i| &pool[i]) else { return Vec::new() };
+    let heard = |c: &&Candidate| {
+        let key = c.key();
+        given.contains(&key) || pool.iter().any(|h| h.key() == key && h.log_evidence > best.log_evidence - HOPELESS)
+    };
+    rivals_of(&best.effects[0], candidates).into_iter().filter(|c| !heard(c)).take(SECOND_HEARING).collect()
+}
+
+/// Candidates whose law contains that of the best single effect of a pool, at its slot, and which do not follow the recording as well although
+/// they can: their fit came to rest somewhere else, or was given up. With them that effect, by its place in the pool.
+pub fn outdone_by_a_special_case<'c>(
+    pool: &[Hypothesis<'_>],
+    candidates: &'c [Candidate],
+) -> Option<(usize, Vec<&'c Candidate>)> {
+    let best = best_of_size(pool, 1)?;
+    let (special, reached) = (&pool[best].effects[0], pool[best].base.log_likelihood);
+    let follows = |c: &Candidate| pool.iter().any(|h| h.key() == c.key() && h.base.log_likelihood >= reached - 1e-3);
+    let wider = candidates.iter().filter(|c| {
+        c.mechanism.contains.contains(&special.mechanism.id) && c.slot.label == special.slot.label && !follows(c)
+    });
+    Some((best, wider.collect()))
+}
+
+/// How a search is bounded.
+#[derive(Debug, Clone, Copy)]
+pub struct SearchOptions {
+    /// Most effects in a set.
+    pub depth: usize,
+    /// Sets that are extended at each depth.
+    pub beam: usize,
+    /// Candidates that are refitted for each set.
+    pub most: usize,
+}
+
+/// What composition asks of the search that it is a part of.
+pub struct Ask<'a, 'd> {
+    /// Whether something significant is left of a hypothesis' residual.
+    pub unexplained: &'a dyn Fn(&Hypothesis<'d>) -> bool,
+    /// What could be missing around a hypothesis.
+    pub around: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
+    /// Effects that its noise model may have taken for noise.
+    pub absorbed: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
+}
+
+/// Log evidence that another effect must add.
+pub const LEAST_GAIN: f64 = 4.0;
+
+/// Pairs of the evidence space that are tried by simulation, and those of them that are fitted to the end.
+const PAIRS: (usize, usize) = (10, 4);
+/// Most rounds of drops and swaps: one may bring another best set, whose members have other rivals.
+const ROUNDS: usize = 4;
+
+/// Log evidence by which the second best set may trail and still have its members' rivals heard.
+const NEARLY: f64 = 6.0;
+
+/// Pairs of candidates of the simulation without effects, fitted together.
+pub fn superposed<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    candidates: &[Candidate],
+    most: usize,
+) -> Vec<Hypothesis<'d>> {
+    if setting.budget.omits(Step::Fits) {
+        return Vec::new();
+    }
+    let (_, r) = none.base.evidence();
+    let own = none.base.values();
+    let mut sketched: Vec<Hypothesis<'d>> = pairs(candidates, &r, PAIRS.0)
+        .par_iter()
+        .filter_map(|pair| {
+            if setting.budget.omits(Step::Fits) {
+                return None;
+            }
+            let parts =
+                [0, 1].map(|i| Part::of_candidate(&candidates[pair.members[i]], pair.points[i], &pair.amplitudes[i]));
+            assemble(setting, none, &own, &parts, &none.base.whitener, 5)
+        })
+        .collect();
+    sketched.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    let rest = sketched.split_off(PAIRS.1.min(sketched.len()).min(most));
+    let to_the_end = |h| if setting.budget.omits(Step::Fits) { h } else { complete(setting, h) };
+    let mut out: Vec<Hypothesis<'d>> = sketched.into_par_iter().map(to_the_end).collect();
+    out.extend(rest);
+    out
+}
+
+/// Extends the hypotheses of `pool` (all of one effect or more) until evidence stops growing, prunes the best and tries swaps.
+///
+/// `candidates` are those of the simulation without effects. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
+pub fn compose<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    candidates: &[Candidate],
+    pool: &mut Vec<Hypothesis<'d>>,
+    options: SearchOptions,
+    ask: &Ask<'_, 'd>,
+) {
+    let Ask { unexplained, around, absorbed } = ask;
+    let enough = || setting.budget.omits(Step::Composition);
+    for depth in 2..=options.depth {
+        if enough() {
+            return;
+        }
+        // Where nothing significant is left there is nothing to add but what the noise model holds.
+        let Some(standing) = best_below(pool, depth).filter(|&b| pool[b].effects.len() + 1 >= depth) else { break };
+        let more = unexplained(&pool[standing]);
+        let best = pool[standing].log_evidence;
+        let parents = beam(pool, depth - 1, options.beam);
+        let mut found = Vec::new();
+        if more && depth == 2 {
+            found.extend(superposed(setting, none, candidates, options.most));
+        }
+        for p in parents {
+            if enough() {
+                break;
+            }
+            if more {
+                found.extend(extended(setting, &pool[p], &around(&pool[p]), options, None));
+            }
+            found.extend(refit_all(setting, &pool[p], &absorbed(&pool[p]).iter().collect::<Vec<_>>()));
+        }
+        if found.is_empty() {
+            break;
+        }
+        let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        for h in found {
+            add(pool, h);
+        }
+        let reached = reached.max(recast(setting, none, pool, depth));
+        if reached < best + LEAST_GAIN {
+            break;
+        }
+    }
+    // Backward: drop each member of the best set, put another in its place.
+    for _ in 0..ROUNDS {
+        let Some(best) = best_of(pool) else { return };
+        let n = pool[best].effects.len();
+        if n < 2 || setting.budget.omits(Step::Drops) {
+            return;
+        }
+        let (before, evidence) = (pool[best].key(), pool[best].log_evidence);
+        let rests: Vec<(usize, Hypothesis<'d>)> =
+            (0..n).filter_map(|index| Some((index, without(setting, none, &pool[best], index)?))).collect();
+        // What remains may come to rest where it had not come alone: then the other was no more than the way there.
+        if rests.iter().any(|(_, rest)| rest.log_evidence > evidence - LEAST_GAIN) {
+            rests.into_iter().for_each(|(_, rest)| add(pool, rest));
+            continue;
+        }
+        let mut found = Vec::new();
+        for (index, rest) in &rests {
+            if enough() {
+                break;
+            }
+            let candidates = around(rest);
+            found.extend(swapped(setting, none, &pool[best], *index, &candidates));
+            found.extend(extended(setting, rest, &candidates, options, Some(&pool[best].effects[*index])));
+        }
+        found.extend(rests.into_iter().map(|(_, rest)| rest));
+        for h in found {
+            add(pool, h);
+        }
+        if best_of_size(pool, n).is_some_and(|b| pool[b].log_evidence > evidence) {
+            recast(setting, none, pool, n);
+        }
+        let stands = |pool: &[Hypothesis<'_>]| best_of(pool).is_none_or(|b| pool[b].key() == before);
+        if stands(pool) && !enough() {
+            beside_the_second(setting, none, pool, n, ask);
+        }
+        if stands(pool) {
+            break;
+        }
+    }
+}
+
+/// Adds what comes of the second best set of so many effects, where it is nearly as likely as the best, by putting in the place of each member what
+/// is easily taken for it: where both members of the best set stand for something else, no single swap leads from it to what they stand for.
+fn beside_the_second<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    pool: &mut Vec<Hypothesis<'d>>,
+    effects: usize,
+    ask: &Ask<'_, 'd>,
+) {
+    let mut order: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].effects.len() == effects).collect();
+    order.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
+    let [best, second, ..] = order[..] else { return };
+    if pool[second].log_evidence < pool[best].log_evidence - NEARLY {
+        return;
+    }
+    let mut found = Vec::new();
+    for index in 0..effects {
+        if setting.budget.omits(Step::Composition) {
+            break;
+        }
+        let Some(rest) = without(setting, none, &pool[second], index) else { continue };
+        found.extend(swapped(setting, none, &pool[second], index, &(ask.around)(&rest)));
+        found.push(rest);
+    }
+    found.into_iter().for_each(|h| add(pool, h));
+}
+
+/// A set with what is easily taken for one of its members in that member's place, the others as they are: fitted alone first, they may come to rest
+/// where nothing leads back from.
+fn swapped<'d>(
+    setting: &Setting<'d>,
+    none: &Hypothesis<'d>,
+    set: &Hypothesis<'d>,
+    index: usize,
+    candidates: &[Candidate],
+) -> Vec<Hypothesis<'d>> {
+    let values = set.base.values();
+    let sketched = rivals_of(&set.effects[index], candidates).into_par_iter().filter_map(|rival| {
+        if setting.budget.omits(Step::Composition) {
+            return None;
+        }
+        let amplitudes = rival.points.first().map_or(&[][..], |p| &p.amplitudes);
+        let mut parts: Vec<Part> = set.effects.iter().map(|e| Part::of_effect(e, &values)).collect();
+        parts[index] = Part::of_candidate(rival, 0, amplitudes);
+        let h = assemble(setting, none, &values, &parts, &set.base.whitener, 5)?;
+        let near = h.log_evidence > set.log_evidence - HOPELESS;
+        Some(if near { complete(setting, h) } else { h })
+    });
+    sketched.collect()
+}
+
+/// Adds the best set of so many effects with the law of each member in the form that has the most evidence beside the others: a member that
+/// was written before another was known may show more, or have less to show, beside it. Returns the evidence of what was added.
+fn recast<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, pool: &mut Vec<Hypothesis<'d>>, effects: usize) -> f64 {
+    let mut reached = f64::NEG_INFINITY;
+    for index in 0..effects {
+        let Some(best) = best_of_size(pool, effects) else { break };
+        if let Some(other) = finer(setting, none, &pool[best], index) {
+            reached = other.log_evidence;
+            add(pool, other);
+        }
+    }
+    reached
+}
+
+/// A set with one more effect, for the likeliest of what could be missing around it, and for the family of the effect that was taken out.
+fn extended<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'d>,
+    candidates: &[Candidate],
+    options: SearchOptions,
+    dropped: Option<&Effect>,
+) -> Vec<Hypothesis<'d>> {
+    if candidates.first().is_none_or(|c| c.score() < 2.0) {
+        return Vec::new();
+    }
+    let mut list = short_list(candidates, options.most);
+    for rival in dropped.map_or_else(Vec::new, |d| rivals_of(d, candidates)) {
+        include(&mut list, rival);
+    }
+    refit_all(setting, parent, &list)
+}
+
+/// Adds a hypothesis, or replaces the same statement with less evidence.
+pub fn add<'d>(pool: &mut Vec<Hypothesis<'d>>, h: Hypothesis<'d>) {
+    let key = h.key();
+    match pool.iter_mut().find(|p| p.key() == key) {
+        Some(same) => {
+            if h.log_evidence > same.log_evidence {
+                *same = h;
+            }
+        }
+        None => pool.push(h),
+    }
+}
+
+/// The set that stands: most evidence, where each further effect must have added [`LEAST_GAIN`].
+pub fn best_of(pool: &[Hypothesis<'_>]) -> Option<usize> {
+    best_below(pool, usize::MAX)
+}
+
+/// The set of so many effects with the most evidence.
+fn best_of_size(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
+    (0..pool.len())
+        .filter(|&i| pool[i].effects.len() == effects)
+        .max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence))
+}
+
+/// The set that stands among those of fewer effects than this.
+fn best_below(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
+    let most = pool.iter().map(|h| h.effects.len()).filter(|&n| n < effects).max()?;
+    let mut standing: Option<usize> = None;
+    for size in 0..=most {
+        let Some(i) = best_of_size(pool, size) else { continue };
+        match standing {
+            Some(s)
+                if pool[i].log_evidence < pool[s].log_evidence + LEAST_GAIN * (size - pool[s].effects.len()) as f64 => {
+            }
+            _ => standing = Some(i),
+        }
+    }
+    standing
+}
+
+/// The best sets of one size, of different families where there are any.
+fn beam(pool: &[Hypothesis<'_>], size: usize, width: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].effects.len() == size).collect();
+    order.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
+    let families = |i: usize| -> Vec<&'static str> {
+        let mut f: Vec<&'static str> = pool[i].effects.iter().map(|e| e.mechanism.family.name()).collect();
+        f.sort_unstable();
+        f
+    };
+    let mut chosen: Vec<usize> = Vec::new();
+    for &i in &order {
+        if chosen.len() < width && !chosen.iter().any(|&c| families(c) == families(i)) {
+            chosen.push(i);
+        }
+    }
+    chosen
+}

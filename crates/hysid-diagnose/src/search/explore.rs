@@ -1,0 +1,165 @@
+//! Everything that is looked for on one calibration: test, second look, refits, composition, the sets that were asked for.
+
+use super::Search;
+use super::budget::Step;
+use super::compose::{add, best_of};
+use super::hypothesis::{Hypothesis, Setting};
+use super::screen::{Candidate, screen};
+use crate::answer::file::DetectableRecord;
+use crate::answer::records::detectability;
+use crate::calibration::lesson::{Done, Lesson, lesson};
+use crate::error::DiagnoseError;
+use crate::evidence::correlation_time;
+use crate::model::base::{Base, NoiseKind};
+use crate::request::{Hooks, Request, words};
+
+/// What was found on one calibration.
+pub struct Explored<'a, 'd> {
+    /// The search, under the noise model that decided.
+    pub search: Search<'a, 'd>,
+    /// Every set that was fitted; the simulation as it is comes first.
+    pub pool: Vec<Hypothesis<'d>>,
+    /// What could be missing in the simulation as it is.
+    pub candidates: Vec<Candidate>,
+    /// Whether simulation and recording differ by more than noise does.
+    pub significant: bool,
+    /// Of the mismatch test and of the second look, the smaller.
+    pub p_value: f64,
+    /// What the calibrated simulation leaves of each output (rms).
+    pub residual: Vec<f64>,
+    /// The least effect that could have been seen, by mechanism.
+    pub detectable: Vec<DetectableRecord>,
+    /// The simulation as it is where it leaves the least; `None` where that is the first of the pool.
+    pub least: Option<Hypothesis<'d>>,
+    /// What the user must be told of it.
+    pub notes: Vec<String>,
+}
+
+/// Searches that may be begun again.
+pub const LESSONS: usize = 2;
+
+/// Looks for what is missing around a calibrated simulation; where that teaches something of the simulation itself, once more, up to so many
+/// times.
+///
+/// # Errors
+/// A question that names no mechanism or slot.
+pub fn explore<'a, 'd>(
+    setting: &Setting<'d>,
+    base: Base<'d>,
+    request: &Request<'_>,
+    hooks: &'a Hooks<'a>,
+    lessons: usize,
+) -> Result<Explored<'a, 'd>, DiagnoseError> {
+    let again = |lesson: Lesson<'d>| {
+        (hooks.progress)(lesson.doing);
+        let next = Setting { substeps: lesson.substeps, ..setting.clone() };
+        let mut found = explore(&next, lesson.base, request, hooks, lessons - 1)?;
+        found.notes.insert(0, lesson.note);
+        Ok(found)
+    };
+    let learned = |search: &Search<'_, 'd>, none: &Hypothesis<'d>, pool: &[Hypothesis<'d>], done: Done| {
+        (lessons > 0).then(|| lesson(setting, &search.setting, none, pool, done)).flatten()
+    };
+    let options = request.options;
+    let mut notes = Vec::new();
+    let none = setting.hypothesis(Vec::new(), base);
+
+    (hooks.progress)("looking for what could be missing");
+    let evidence = none.base.evidence();
+    let mut candidates = screen(&none.base, &setting.original, &[], &evidence, &|_, _| true);
+    let residual = setting.data.layout.rms(&none.base.fit.residual);
+    let detectable = detectability(&candidates);
+    let search = Search::new(setting.clone(), options, hooks);
+    let test = search.test(&candidates, &none.base, &evidence);
+    let mut p_value = test.p_value;
+    // Where the residual is mismatch throughout, the plain sum of squares decides, with as many samples as are independent.
+    let tau = correlation_time(&setting.data.layout, &none.base.fit.residual);
+    let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
+    let plainly = Search::new(plain, options, hooks);
+    let murky = none.base.gross() || none.base.far();
+    let mut significant = test.p_value < options.alpha;
+    // A slight colour matters where nothing is seen under it.
+    let colour = none.base.coloured() || none.base.driven() || (!significant && none.base.whitener.coefficients() > 0);
+    let heard = murky || (colour && !setting.budget.omits(Step::OtherNoise));
+    let plain_start = if heard { plainly.start(&none) } else { None };
+    let (mut gross, under_white) = if murky { (plain_start, None) } else { (None, plain_start) };
+    let mut pool = Vec::new();
+    // A coloured noise model takes part of a mismatch for noise: what plain squares would find is heard too.
+    if let Some((start, found)) = &under_white {
+        (hooks.progress)("refitting the likeliest effects without a noise model");
+        pool = search.under_noise(&none, &plainly.glance(start, found));
+    }
+    if !significant {
+        (hooks.progress)("taking a second look");
+        let seen = match &gross {
+            Some((start, found)) => plainly.on_blocks(start, &plainly.glance(start, found)),
+            None => {
+                search.glance(&none, &candidates).into_iter().for_each(|h| add(&mut pool, h));
+                search
+                    .by_chance(&none, &pool, candidates.len())
+                    .or_else(|| search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref()))
+            }
+        };
+        if let Some(p) = seen.or_else(|| search.by_terms(&none)) {
+            notes.push(format!(
+                "surrogates of the residual do not tell the mismatch from noise (p = {:.3}); effects that were fitted to it do (p = {p:.1e})",
+                test.p_value
+            ));
+            p_value = p.min(p_value);
+            significant = true;
+        }
+    }
+    if !significant {
+        pool.clear();
+    }
+    if significant && let Some((start, found)) = gross.take() {
+        plainly.singles(&start, &found, &mut pool);
+        if let Some(lesson) = learned(&plainly, &start, &pool, Done::Singles) {
+            return again(lesson);
+        }
+        plainly.combine(&start, &found, &mut pool);
+        let sets = search.under_noise(&none, &pool);
+        let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
+        if fine {
+            pool = sets;
+        } else {
+            gross = Some((start, found));
+        }
+    }
+    if significant && gross.is_none() {
+        search.singles(&none, &candidates, &mut pool);
+        if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
+            return again(lesson);
+        }
+        search.combine(&none, &candidates, &mut pool);
+    }
+    let least = under_white.map(|(start, _)| start);
+    let (search, none) = match gross {
+        Some((start, found)) if significant => {
+            candidates = found;
+            (plainly, start)
+        }
+        _ => (search, none),
+    };
+    let (search, none) = match learned(&search, &none, &pool, Done::Whole).filter(|_| significant) {
+        Some(lesson) if lesson.only_fits => {
+            (hooks.progress)(lesson.doing);
+            notes.push(lesson.note);
+            let finely = Search::new(Setting { substeps: lesson.substeps, ..search.setting.clone() }, options, hooks);
+            let none = finely.setting.hypothesis(Vec::new(), lesson.base);
+            pool = finely.under_noise(&none, &pool);
+            (finely, none)
+        }
+        Some(lesson) => return again(lesson),
+        None => (search, none),
+    };
+    for question in request.questions {
+        (hooks.progress)("weighing what was asked");
+        match search.answer(&none, question)? {
+            Some(h) => add(&mut pool, h),
+            None => notes.push(format!("{} could not be fitted", words(question))),
+        }
+    }
+    pool.insert(0, none);
+    Ok(Explored { search, pool, candidates, significant, p_value, residual, detectable, least, notes })
+}

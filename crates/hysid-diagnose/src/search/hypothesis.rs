@@ -1,0 +1,175 @@
+//! A hypothesis: a set of effects, written into the user's simulation and fitted together with its parameters.
+//!
+//! Its evidence is the log likelihood of the residual under its own noise model, less half of `ln n` for each unknown that the effects
+//! brought (the Bayes criterion).
+
+use hysid_plant::Simulation;
+
+use super::budget::Budget;
+use crate::data::{DataSet, held_out_blocks};
+use crate::evidence::Whitener;
+use crate::mechanism::{Mechanism, Rewritten};
+use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
+use crate::model::{Model, Values};
+use crate::refit::{LmOptions, go_on};
+use crate::slot::Slot;
+
+/// An effect of a hypothesis.
+#[derive(Debug, Clone)]
+pub struct Effect {
+    /// The mechanism.
+    pub mechanism: &'static Mechanism,
+    /// The slot at which it was written.
+    pub slot: Slot,
+    /// How it was written: names of its parameters and states, what is reported.
+    pub written: Rewritten,
+    /// Share that the simulation's own parameters absorb, from the screening.
+    pub concealment: Option<f64>,
+}
+
+/// A fitted set of effects.
+#[derive(Debug)]
+pub struct Hypothesis<'d> {
+    /// The effects in the order in which they were written.
+    pub effects: Vec<Effect>,
+    /// The fitted simulation.
+    pub base: Base<'d>,
+    /// Log likelihood less the price of what the effects brought.
+    pub log_evidence: f64,
+}
+
+/// Names of a set, sorted: two hypotheses with the same key are the same statement.
+pub type Key = Vec<(&'static str, String)>;
+
+impl Hypothesis<'_> {
+    /// The statement that it makes.
+    pub fn key(&self) -> Key {
+        self.key_without(usize::MAX)
+    }
+
+    /// The statement without this one of its effects.
+    pub fn key_without(&self, member: usize) -> Key {
+        let others = self.effects.iter().enumerate().filter(|(i, _)| *i != member);
+        let mut key: Key = others.map(|(_, e)| (e.mechanism.id, e.slot.label.clone())).collect();
+        key.sort();
+        key
+    }
+}
+
+/// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest: log likelihood of the blocks, each row for
+/// the share that it has in the fit, and the sum of squares of each block's rows for the standard error of a difference.
+pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Vec<f64>)> {
+    let data = setting.data;
+    let weights = held_out_blocks(&data.layout, &data.y);
+    let options = LmOptions { iterations: 5, ..LmOptions::default() };
+    let fit = go_on(&h.base.model, &h.base.fit, &data.layout, &h.base.whitener, Some(&weights), options)?;
+    let white = h.base.whitener.apply(&data.layout, &fit.residual);
+    let (mut score, mut squares) = (0.0, Vec::new());
+    for s in &data.layout.series {
+        let scale = h.base.whitener.models[s.output].log_scale(s.rows.len()) / s.rows.len() as f64;
+        for row in s.rows.clone().filter(|&row| weights[row] == 0.0) {
+            score -= 0.5 * white[row] * white[row] + scale;
+            squares.push(fit.residual[row] * fit.residual[row]);
+        }
+    }
+    // Rows that are no independent witnesses of the fit are none of the blocks either.
+    (!squares.is_empty()).then_some((setting.noise.share() * score, squares))
+}
+
+/// What all fits share.
+#[derive(Debug, Clone)]
+pub struct Setting<'d> {
+    /// The estimation data.
+    pub data: &'d DataSet,
+    /// The user's simulation.
+    pub original: Simulation,
+    /// Names of its states.
+    pub own_states: Vec<String>,
+    /// Names of the states whose derivative an unknown force or flow may enter.
+    pub pushed: Vec<String>,
+    /// Integration steps in each period.
+    pub substeps: usize,
+    /// Number of unknowns of the simulation without effects.
+    pub own_unknowns: usize,
+    /// Iterations of a refit on the short list.
+    pub iterations: usize,
+    /// How noise is modelled.
+    pub noise: NoiseKind,
+    /// The time that the search may take.
+    pub budget: &'d Budget<'d>,
+}
+
+impl<'d> Setting<'d> {
+    /// Fits a document from values; the noise model is that given, then its own.
+    pub fn fit(
+        &self,
+        document: &Simulation,
+        start: &Values,
+        noise: Option<&Whitener>,
+        rounds: usize,
+        iterations: usize,
+    ) -> Option<Base<'d>> {
+        self.fit_from(document, Start::Values(start), noise, rounds, iterations)
+    }
+
+    /// Goes on with a fitted document; the noise model is that given, then its own.
+    pub fn further(
+        &self,
+        base: &Base<'_>,
+        noise: Option<&Whitener>,
+        rounds: usize,
+        iterations: usize,
+    ) -> Option<Base<'d>> {
+        self.fit_from(base.model.simulation(), Start::Fit(&base.fit), noise, rounds, iterations)
+    }
+
+    fn fit_from(
+        &self,
+        document: &Simulation,
+        start: Start<'_>,
+        noise: Option<&Whitener>,
+        rounds: usize,
+        iterations: usize,
+    ) -> Option<Base<'d>> {
+        let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
+        let options = LmOptions { iterations, ..LmOptions::default() };
+        fit_simulation(model, start, &self.pushed, noise, rounds, options, self.noise)
+    }
+
+    /// A fitted document as a hypothesis.
+    pub fn hypothesis(&self, effects: Vec<Effect>, base: Base<'d>) -> Hypothesis<'d> {
+        let log_evidence = self.evidence(&base);
+        Hypothesis { effects, base, log_evidence }
+    }
+
+    /// The evidence of a fitted document.
+    pub fn evidence(&self, base: &Base<'_>) -> f64 {
+        let further = base.model.unknowns().len().saturating_sub(self.own_unknowns);
+        base.log_likelihood - self.noise.price(self.own_unknowns, further, self.data.rows())
+    }
+}
+
+/// For tests: a simulation calibrated on a data set from its own values, and what its fits share.
+#[cfg(test)]
+pub fn calibrated<'d>(
+    original: Simulation,
+    data: &'d DataSet,
+    noise: NoiseKind,
+    budget: &'d Budget<'d>,
+) -> (Setting<'d>, Hypothesis<'d>) {
+    let mut setting = Setting {
+        data,
+        own_states: original.states.iter().map(|s| s.name.clone()).collect(),
+        pushed: crate::model::force::pushed(&original),
+        original,
+        substeps: 2,
+        own_unknowns: 0,
+        iterations: 12,
+        noise,
+        budget,
+    };
+    let base = setting.fit(&setting.original, &Values::default(), None, 3, 25).unwrap();
+    setting.own_unknowns = base.model.unknowns().len();
+    let none = setting.hypothesis(Vec::new(), base);
+    (setting, none)
+}

@@ -1,0 +1,374 @@
+//! The search for a set of effects: calibration of what there is, test, refit of the likeliest, composition.
+
+pub mod assemble;
+pub mod budget;
+pub mod compose;
+pub mod explore;
+pub mod finer;
+pub mod fitting;
+pub mod hypothesis;
+pub mod joint;
+pub mod numerics_check;
+pub mod peaks;
+pub mod rehearsal;
+pub mod screen;
+pub mod second_look;
+
+use std::cell::{OnceCell, RefCell};
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::error::DiagnoseError;
+use crate::evidence::{Contender, Projector, SurrogateTest, TestOptions, surrogate_test};
+use crate::mechanism::{Family, Mechanism};
+use crate::model::base::{Base, NoiseKind};
+use crate::model::{Model, Values};
+use crate::openset::{OpenSet, correction};
+use crate::request::{Hooks, Options, Question, Request};
+use crate::slot::Slot;
+use budget::Step;
+use compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short_list, unheard};
+use fitting::{refit, refit_all, refit_wider};
+use hypothesis::{Hypothesis, Key, Setting};
+use screen::{Candidate, screen};
+use second_look::{ODDS_AGAINST_MORE, SLOW, unlikely};
+
+/// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
+pub const WORSE: f64 = 1.05;
+
+/// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
+pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Base<'d>, DiagnoseError> {
+    let simulation = request.simulation;
+    let bad =
+        |e: hysid_plant::Error| DiagnoseError::Simulation { file: request.file.to_owned(), problem: e.to_string() };
+    let model = Model::new(simulation, setting.data, &setting.own_states, setting.substeps).map_err(bad)?;
+    let start = model.theta(&Values::default());
+    let diverged = model.simulate(&start).1;
+    let mut best: Option<Base<'d>> = None;
+    let (starts, substeps) = crate::calibration::global::starts(&model, simulation, request.options.seed);
+    setting.substeps = substeps;
+    for from in starts {
+        let Some(b) = setting.fit(simulation, &from, None, 1, 25) else { continue };
+        let cost = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual);
+        if best.as_ref().is_none_or(|x| cost(&b) < cost(x)) {
+            best = Some(b);
+        }
+    }
+    let Some(best) = best else {
+        let (stretch, sample) = diverged.unwrap_or((0, 0));
+        let s = &setting.data.stretches[stretch];
+        return Err(DiagnoseError::Explodes {
+            file: request.file.to_owned(),
+            recording: setting.data.recordings[s.recording].clone(),
+            at_s: s.start_s + sample as f64 * setting.data.period_s,
+        });
+    };
+    let rms = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual).sqrt();
+    // Under its own noise, twice.
+    let polished = setting.further(&best, Some(&best.whitener), 2, 20);
+    Ok(match polished {
+        // Noise of any colour may not explain what the simulation can. Where it is a force through the plant the plain squares are no judge:
+        // parameters follow its slow wander, and an effect that is fitted under the noise would win by undoing that.
+        Some(p) if p.log_likelihood > best.log_likelihood && (p.driven() || rms(&p) < WORSE * rms(&best)) => p,
+        _ => best,
+    })
+}
+
+/// Composition goes on while the mismatch that remains is significant at this level.
+const STOP_LEVEL: f64 = 0.02;
+/// Sets that are carried from one noise model to another.
+const MOST_CARRIED: usize = 8;
+/// Iterations by plain squares before what a noise model may have absorbed is looked at, and how many effects of that kind are fitted.
+const PLAIN_ITERATIONS: usize = 5;
+const MOST_ABSORBED: usize = 3;
+/// Composition goes on too while a candidate scores this much around a hypothesis: surrogates of a residual that is mostly mismatch score as
+/// high as the mismatch itself, and their p-value says nothing.
+const STOP_SCORE: f64 = 25.0;
+/// Rounds in which the rivals of the best single effect are fitted to the end.
+const HEARINGS: usize = 2;
+/// Candidates that are refitted alone.
+const SHORT_LIST: usize = 10;
+
+/// Plain error, over that of a set of no more effects, at which a set under a noise model takes mismatch for noise.
+const GIVEN_UP: f64 = 1.5;
+
+/// Whether a set leaves a larger plain error than the simulation without effects: its noise model explains, and the effects do not.
+pub fn leaves_more(h: &Hypothesis<'_>, none: &Hypothesis<'_>) -> bool {
+    plain_error(h, none).1 > plain_error(none, none).1
+}
+
+/// The number of effects of a set, and the plain error that it leaves, each output in units of what the simulation without effects leaves of it.
+fn plain_error(h: &Hypothesis<'_>, none: &Hypothesis<'_>) -> (usize, f64) {
+    let layout = &h.base.model.data().layout;
+    let (left, before) = (layout.rms(&h.base.fit.residual), layout.rms(&none.base.fit.residual));
+    let error = left.iter().zip(&before).map(|(l, b)| (l / b.max(f64::MIN_POSITIVE)).powi(2)).sum::<f64>().sqrt();
+    (h.effects.len(), error)
+}
+
+/// Whether a set of so many effects that leaves this error leaves much more than one of these of no more effects.
+fn outdone((effects, error): (usize, f64), others: &[(usize, f64)]) -> bool {
+    others.iter().any(|&(of, left)| of <= effects && error > GIVEN_UP * left)
+}
+
+/// Drops the sets that call noise what others explain, where the simulation is so far off that most of the residual is no noise. A colour can
+/// be found for any residual, and the likelihood of a slow one under its own colour is high.
+fn keep_explaining<'d>(none: &Hypothesis<'d>, pool: &mut Vec<Hypothesis<'d>>) {
+    if none.base.far() {
+        let errors: Vec<_> = pool.iter().map(|h| plain_error(h, none)).collect();
+        let mut all = errors.iter();
+        pool.retain(|_| all.next().is_none_or(|own| !outdone(*own, &errors)));
+    }
+}
+
+/// A search for sets of effects on one calibrated simulation.
+pub struct Search<'a, 'd> {
+    /// What all fits share.
+    pub setting: Setting<'d>,
+    /// Level and seed of the tests.
+    pub options: Options,
+    /// Progress and time.
+    pub hooks: &'a Hooks<'a>,
+    /// Tests of what remains, by statement: composition and the verdict ask for the same ones.
+    tests: RefCell<BTreeMap<Key, SurrogateTest>>,
+    /// What could be missing around the hypothesis that was tested last: composition mostly extends that one next.
+    screened: RefCell<Option<(Key, Vec<Candidate>)>>,
+    /// Generic terms for the simulation without effects: the second look, the verdict and the correction ask for the same ones.
+    open: OnceCell<Option<OpenSet>>,
+}
+
+impl<'a, 'd> Search<'a, 'd> {
+    /// A search that has found nothing yet.
+    pub fn new(setting: Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
+        Self { setting, options, hooks, tests: RefCell::default(), screened: RefCell::default(), open: OnceCell::new() }
+    }
+
+    /// The simulation without effects under this search's noise model, and what could be missing in it.
+    pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
+        let base = self.setting.further(&none.base, None, 2, 25)?;
+        let start = self.setting.hypothesis(Vec::new(), base);
+        let candidates = screen(&start.base, &self.setting.original, &[], &start.base.evidence(), &|_, _| true);
+        Some((start, candidates))
+    }
+
+    /// Adds the effects that are fitted alone: the short list, its rivals, the numerics.
+    pub fn singles(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
+        (self.hooks.progress)("refitting the likeliest effects");
+        for h in refit_all(&self.setting, none, &short_list(candidates, SHORT_LIST)) {
+            add(pool, h);
+        }
+        // A drift with an offset is neither of them alone, and both lose to what bends the parameters.
+        let beside = |h: &Hypothesis<'d>| refit_all(&self.setting, h, &self.absorbed(h).iter().collect::<Vec<_>>());
+        let mut absorbed = beside(none);
+        absorbed.extend(absorbed.first().map(beside).unwrap_or_default());
+        absorbed.into_iter().for_each(|h| add(pool, h));
+        // One hearing may bring another best effect, whose rivals are others.
+        let mut given: Vec<Key> = Vec::new();
+        for _ in 0..HEARINGS {
+            let list = unheard(pool, candidates, &given);
+            if list.is_empty() || self.setting.budget.omits(Step::Rivals) {
+                break;
+            }
+            given.extend(list.iter().map(|c| c.key()));
+            for h in refit_all(&self.setting, none, &list) {
+                add(pool, h);
+            }
+        }
+        if let Some((special, wider)) = outdone_by_a_special_case(pool, candidates)
+            && !self.setting.budget.omits(Step::Rivals)
+        {
+            let setting = &self.setting;
+            let found: Vec<Hypothesis<'d>> =
+                wider.par_iter().filter_map(|c| refit_wider(setting, none, c, &pool[special])).collect();
+            found.into_iter().for_each(|h| add(pool, h));
+        }
+        if !self.setting.budget.omits(Step::Numerics)
+            && let Some(h) = numerics_check::artefact(&self.setting, none)
+        {
+            add(pool, h);
+        }
+        keep_explaining(none, pool);
+    }
+
+    /// Adds what composition makes of the sets there are.
+    pub fn combine(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
+        (self.hooks.progress)("looking for a second and third effect");
+        let unexplained = |h: &Hypothesis<'_>| {
+            let test = self.remains(h);
+            let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured();
+            seen || self.open(h).is_some_and(|o| unlikely(&o, ODDS_AGAINST_MORE) < self.options.alpha)
+        };
+        let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
+        let around = |h: &Hypothesis<'d>| self.around(h);
+        let absorbed = |h: &Hypothesis<'d>| self.absorbed(h);
+        let hear = Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed };
+        compose(&self.setting, none, candidates, pool, bounds, &hear);
+        keep_explaining(none, pool);
+        self.screened.take();
+    }
+
+    /// The likeliest of these sets, which were found under another noise model, fitted under this search's.
+    pub fn under_noise(&self, none: &Hypothesis<'d>, sets: &[Hypothesis<'d>]) -> Vec<Hypothesis<'d>> {
+        let setting = &self.setting;
+        let mut order: Vec<&Hypothesis<'d>> = sets.iter().collect();
+        order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        order
+            .into_par_iter()
+            .take(MOST_CARRIED)
+            .enumerate()
+            .filter_map(|(i, h)| {
+                if i > 0 && setting.budget.omits(Step::OtherNoise) {
+                    return None;
+                }
+                let base = setting.further(&h.base, None, 3, setting.iterations)?;
+                (base.log_likelihood > none.base.log_likelihood).then(|| setting.hypothesis(h.effects.clone(), base))
+            })
+            .collect()
+    }
+
+    /// The set that a question names, fitted one effect after the other; `None` where one of them cannot be fitted.
+    ///
+    /// # Errors
+    /// A mechanism that is not in the catalogue, or a slot that the simulation does not have for it.
+    pub fn answer(&self, none: &Hypothesis<'d>, question: &Question) -> Result<Option<Hypothesis<'d>>, DiagnoseError> {
+        let mut set: Option<Hypothesis<'d>> = None;
+        for (mechanism, slot) in question {
+            let parent = set.as_ref().unwrap_or(none);
+            let evidence = parent.base.evidence();
+            let wanted = |m: &Mechanism, s: &Slot| m.id == *mechanism && s.label == *slot;
+            let found = screen(&parent.base, &self.setting.original, &parent.effects, &evidence, &wanted);
+            let Some(candidate) = found.first() else {
+                return Err(DiagnoseError::Question(format!("{mechanism}@{slot}")));
+            };
+            let Some(h) = refit(&self.setting, parent, candidate) else { return Ok(None) };
+            set = Some(h);
+        }
+        Ok(set)
+    }
+
+    /// Generic terms for what is left of a hypothesis' residual.
+    pub fn open(&self, h: &Hypothesis<'_>) -> Option<OpenSet> {
+        let found = || correction(&h.base, self.setting.noise);
+        if h.effects.is_empty() { self.open.get_or_init(found).clone() } else { found() }
+    }
+
+    /// The test of what remains of a hypothesis' residual.
+    pub fn remains(&self, h: &Hypothesis<'_>) -> SurrogateTest {
+        let key = fitted_key(h);
+        if let Some(known) = self.tests.borrow().get(&key) {
+            return known.clone();
+        }
+        let evidence = h.base.evidence();
+        let rest = screen(&h.base, &self.setting.original, &h.effects, &evidence, &|_, _| true);
+        let test = self.test(&rest, &h.base, &evidence);
+        self.tests.borrow_mut().insert(key.clone(), test.clone());
+        *self.screened.borrow_mut() = Some((key, rest));
+        test
+    }
+
+    /// What could be missing around a hypothesis.
+    fn around(&self, h: &Hypothesis<'_>) -> Vec<Candidate> {
+        match self.screened.borrow_mut().take() {
+            Some((key, found)) if key == fitted_key(h) => found,
+            _ => screen(&h.base, &self.setting.original, &h.effects, &h.base.evidence(), &|_, _| true),
+        }
+    }
+
+    /// Offsets, drifts and lines that plain squares see around a hypothesis: a noise that rises towards low frequency holds the ones, an autoregression
+    /// predicts the others, and under it their scores are nothing. Fitted beside the effects, each with a noise model of its own, the evidence tells
+    /// which it is.
+    fn absorbed(&self, h: &Hypothesis<'d>) -> Vec<Candidate> {
+        if h.base.whitener.coefficients() == 0 || self.setting.budget.omits(Step::OtherNoise) {
+            return Vec::new();
+        }
+        let plain = Setting { noise: NoiseKind::White(1.0), ..self.setting.clone() };
+        let Some(base) = plain.further(&h.base, None, 1, PLAIN_ITERATIONS) else { return Vec::new() };
+        let like_noise = |m: &Mechanism, _: &Slot| m.family.is_slow_noise() || m.family == Family::ExternalDisturbance;
+        let mut found = screen(&base, &self.setting.original, &h.effects, &base.evidence(), &like_noise);
+        found.retain(|c| c.score() > STOP_SCORE);
+        found.truncate(MOST_ABSORBED);
+        found
+    }
+
+    /// The mismatch test over all candidates' kept columns. Where the noise has a colour, what slow noise does has a handicap.
+    pub fn test(&self, candidates: &[Candidate], base: &Base<'_>, evidence: &(Projector, Vec<f64>)) -> SurrogateTest {
+        let coloured = base.whitener.coefficients() > 0;
+        // A score is twice a gain in log likelihood.
+        let handicap = |c: &Candidate| if coloured && c.mechanism.family.is_slow_noise() { 2.0 * SLOW } else { 0.0 };
+        let groups: Vec<Contender<'_>> = candidates
+            .iter()
+            .flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref()).map(move |group| (c, group)))
+            .map(|(c, group)| Contender { group, handicap: handicap(c) })
+            .collect();
+        let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed };
+        surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, options)
+    }
+}
+
+/// The statement of a hypothesis with its evidence: a better fit of the same statement is looked at anew.
+fn fitted_key(h: &Hypothesis<'_>) -> Key {
+    let mut key = h.key();
+    key.push(("", format!("{:.3}", h.log_evidence)));
+    key
+}
+
+#[cfg(test)]
+#[path = "../../tests/common/oscillator.rs"]
+mod oscillator;
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
+    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use super::*;
+    use crate::data::DataSet;
+    use crate::search::budget::Budget;
+    use crate::search::hypothesis::calibrated;
+
+    /// What may have been absorbed, and the largest score of the same under the noise model's own eyes, where this is added to an oscillator's
+    /// output, in multiples of white noise, by the time in seconds.
+    fn absorbed(added: impl Fn(f64) -> f64) -> (Vec<&'static str>, Option<f64>) {
+        let mut random = normal(5);
+        let u = drive(1000, &mut random);
+        let mut y = respond(&u, REAL, |_, _| 0.0);
+        let noise = 0.005 * rms(&y);
+        y.iter_mut().enumerate().for_each(|(i, y)| *y += noise * (added(i as f64 * PERIOD) + random()));
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
+        let search = Search::new(setting, Options::default(), &hooks);
+        let found: Vec<&str> = search.absorbed(&none).iter().map(|c| c.mechanism.id).collect();
+        let own = search.around(&none).iter().find(|c| found.first() == Some(&c.mechanism.id)).map(Candidate::score);
+        (found, own)
+    }
+
+    #[test]
+    fn what_a_noise_model_takes_for_noise_is_seen_by_plain_squares() {
+        let (nothing, _) = absorbed(|_| 0.0);
+        assert!(nothing.is_empty(), "{nothing:?}");
+        let (line, own) = absorbed(|t| 3.0 * (31.0 * t).sin());
+        assert!(line.first() == Some(&"periodic_disturbance") && own.unwrap() < 0.0, "{line:?} {own:?}");
+        let (slow, own) = absorbed(|t| 1.0 + 0.5 * (0.2 * t).sin());
+        assert!(slow.iter().any(|m| m.ends_with("_offset")) && own.unwrap() < STOP_SCORE, "{slow:?} {own:?}");
+    }
+
+    #[test]
+    fn a_set_that_leaves_what_a_smaller_one_explains_has_given_up() {
+        let check = |own, others: &[(usize, f64)], expected| {
+            assert_eq!(outdone(own, others), expected, "{own:?} beside {others:?}")
+        };
+        // A damper: one effect under plain squares, three under a coloured noise.
+        check((3, 0.66), &[(1, 0.22), (3, 0.66)], true);
+        check((1, 0.22), &[(1, 0.22), (3, 0.66)], false);
+        // More effects may leave less.
+        check((1, 0.66), &[(2, 0.22)], false);
+        check((2, 0.30), &[(1, 0.22)], false);
+        check((2, 0.30), &[], false);
+    }
+}

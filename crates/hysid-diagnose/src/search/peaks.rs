@@ -1,0 +1,89 @@
+//! Lines of the residual's spectrum: where a force that follows the clock is looked for.
+
+use crate::model::base::Base;
+
+/// Lines that are looked at.
+const LINES: usize = 4;
+/// Correlation of a recorded output with itself one cycle later from which the motion repeats itself.
+const REPEATS: f64 = 0.98;
+/// How near to a harmonic of the motion a line stands for the motion, as a share of the distance of two frequencies that the recording tells
+/// apart.
+const NEAR: f64 = 0.25;
+
+/// Frequencies of the largest peaks of the residual's spectrum, in hertz.
+///
+/// Where the motion repeats itself, its harmonics are left out: a force that returns with every cycle is a law of the motion, and nothing in
+/// such a recording says that it follows the clock.
+pub fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
+    let data = base.model.data();
+    let Some(series) = data.layout.series.iter().max_by_key(|s| s.rows.len()) else { return Vec::new() };
+    let white = base.whitener.apply(&data.layout, &base.fit.residual);
+    let x = &white[series.rows.clone()];
+    let lines = hysid_signal::fourier(x);
+    let power: Vec<f64> = lines.iter().map(|(re, im)| re * re + im * im).collect();
+    // The frequency of a line's place, in periods within the recording.
+    let cycles = cycle(&data.y[series.rows.clone()]).map(|rows| x.len() as f64 / rows);
+    let of_motion = |at: f64| cycles.is_some_and(|n| (at - n * (at / n).round()).abs() < NEAR);
+    let mut peaks: Vec<(usize, f64)> = (2..power.len().saturating_sub(1))
+        .filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1])
+        .map(|k| (k, summit(&power, k)))
+        .filter(|(_, at)| !of_motion(*at))
+        .collect();
+    peaks.sort_by(|a, b| power[b.0].total_cmp(&power[a.0]));
+    peaks.truncate(LINES);
+    let width = 1.0 / (data.row_period_s() * x.len() as f64);
+    let mut out: Vec<f64> = peaks.into_iter().map(|(_, at)| at * width).collect();
+    out.sort_by(f64::total_cmp);
+    out
+}
+
+/// Where a line that peaks at this place truly is, by the parabola through the logarithms.
+fn summit(power: &[f64], k: usize) -> f64 {
+    let (a, b, c) = (power[k - 1].max(1e-300).ln(), power[k].max(1e-300).ln(), power[k + 1].max(1e-300).ln());
+    let bend = a - 2.0 * b + c;
+    let shift = if bend.abs() > 1e-12 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    k as f64 + shift
+}
+
+/// After how many rows a signal repeats itself, where it does within half its length.
+fn cycle(y: &[f64]) -> Option<f64> {
+    let n = y.len();
+    let mean = y.iter().sum::<f64>() / n.max(1) as f64;
+    let y: Vec<f64> = y.iter().map(|v| v - mean).collect();
+    let most = n / 2;
+    let products = hysid_signal::correlation(&y, &y, most);
+    let mut energy = vec![0.0];
+    for v in &y {
+        energy.push(energy[energy.len() - 1] + v * v);
+    }
+    let like = |lag: usize| {
+        let (head, tail) = (energy[n - lag], energy[n] - energy[lag]);
+        products[lag] / (head * tail).sqrt().max(f64::MIN_POSITIVE)
+    };
+    let r: Vec<f64> = (0..=most).map(like).collect();
+    // Beyond the first time at which it is unlike itself.
+    let unlike = r.iter().position(|r| *r < 0.0)?;
+    let lag = (unlike..most).find(|&lag| r[lag] > REPEATS && r[lag] >= r[lag - 1] && r[lag] > r[lag + 1])?;
+    let (a, b, c) = (r[lag - 1], r[lag], r[lag + 1]);
+    Some(lag as f64 + 0.5 * (a - c) / (a - 2.0 * b + c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cycle_of_a_periodic_motion_is_found() {
+        let motion = |t: f64| (0.113 * t).sin() + 0.4 * (0.339 * t + 1.0).cos();
+        let y: Vec<f64> = (0..700).map(|i| 2.0 + motion(f64::from(i))).collect();
+        let found = cycle(&y).unwrap();
+        let expected = std::f64::consts::TAU / 0.113;
+        assert!((found - expected).abs() < 0.05, "{found} for {expected}");
+        // A sweep does not repeat itself, and one cycle tells nothing.
+        let sweep: Vec<f64> = (0..700).map(|i| (0.0004 * f64::from(i * i)).sin()).collect();
+        assert_eq!(cycle(&sweep), None);
+        assert_eq!(cycle(&y[..80]), None);
+        assert_eq!(cycle(&[]), None);
+        assert_eq!(cycle(&[1.0; 50]), None);
+    }
+}

@@ -1,0 +1,304 @@
+//! Screening: every mechanism at every slot, as a column in the evidence space of a calibrated simulation.
+//!
+//! A mechanism's feature is the derivative of the rewritten simulation's output by its amplitudes, at amplitude zero, for each point of its
+//! shape grid. The derivatives come from the same forward differentiation that calibrates the simulation, so a feature costs one run.
+
+use std::collections::BTreeMap;
+
+use hysid_plant::{Compiled, Expr, Output, Simulation};
+use rayon::prelude::*;
+
+use super::hypothesis::{Effect, Key};
+use super::peaks::residual_peaks;
+use crate::evidence::{FeatureGroup, Projector, norm2, score};
+use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, catalogue};
+use crate::model::base::Base;
+use crate::model::{Model, Values};
+use crate::slot::{Slot, Structure};
+
+/// Points of a candidate whose columns are kept for pairs.
+pub const JOINT: usize = 2;
+/// Points of a candidate whose columns take part in the mismatch test: at least, and at most as the rows allow (the columns are held in memory).
+/// A resonance between two of a few points shows in none of them.
+const KEPT: (usize, usize) = (6, 24);
+/// Rows in all points of a candidate together.
+const KEPT_ROWS: usize = 200_000;
+
+/// Points of a candidate whose columns take part in the mismatch test.
+fn kept(rows: usize) -> usize {
+    (KEPT_ROWS / rows.max(1)).clamp(KEPT.0, KEPT.1)
+}
+
+/// Points of a shape grid that are simulated together.
+const TOGETHER: usize = 8;
+
+/// One joint point of a candidate's shape grids.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// The shapes.
+    pub shapes: Vec<(String, f64)>,
+    /// Its columns in the evidence space; kept for a spread of points ([`kept`] at most), chosen without looking at the residual.
+    pub group: Option<FeatureGroup>,
+    /// Its columns, kept for the best points that are no neighbours: pairs of candidates are judged by them.
+    pub joint: Option<FeatureGroup>,
+    /// Share of its response that the simulation's own parameters absorb.
+    pub concealment: f64,
+    /// Norm of its first amplitude's response outside the tangent space.
+    pub norm: f64,
+    /// The amplitudes that explain the residual best, by name.
+    pub amplitudes: Vec<(String, f64)>,
+    /// Its score.
+    pub score: f64,
+}
+
+/// A mechanism at a slot.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The mechanism.
+    pub mechanism: &'static Mechanism,
+    /// The slot.
+    pub slot: Slot,
+    /// The simulation with it, in physical parameters.
+    pub refit: Rewritten,
+    /// The points of its shape grid, best score first.
+    pub points: Vec<Point>,
+    /// What the recording lacks for it to be seen.
+    pub lacking: Option<String>,
+}
+
+impl Candidate {
+    /// The statement that it makes alone.
+    pub fn key(&self) -> Key {
+        vec![(self.mechanism.id, self.slot.label.clone())]
+    }
+
+    /// Its largest score.
+    pub fn score(&self) -> f64 {
+        self.points.first().map_or(f64::NEG_INFINITY, |p| p.score)
+    }
+
+    /// Share of its response that the simulation's own parameters absorb, at its best point.
+    pub fn concealment(&self) -> Option<f64> {
+        self.points.first().map(|p| p.concealment)
+    }
+}
+
+/// The expression with nothing of an input added: a document refuses outputs that nothing moves.
+fn moving(e: &Expr, input: Option<&str>) -> Expr {
+    match input {
+        Some(u) => e.clone() + Expr::Number(0.0) * Expr::symbol(u),
+        None => e.clone(),
+    }
+}
+
+/// Values of expressions along a simulated trajectory: `[expression][stretch][sample]`.
+pub fn along(base: &Base<'_>, expressions: &[Expr]) -> Option<Vec<Vec<Vec<f64>>>> {
+    let mut probe: Simulation = base.model.simulation().clone();
+    probe.outputs = expressions
+        .iter()
+        .enumerate()
+        .map(|(i, e)| Output {
+            column: format!("probe_{i}"),
+            expression: moving(e, probe.inputs.first().map(|u| u.symbol.as_str())),
+        })
+        .collect();
+    let values = base.values();
+    let theta: Vec<f64> =
+        probe.parameters.iter().map(|p| values.parameters.get(&p.name).copied().unwrap_or(p.value)).collect();
+    let compiled = Compiled::new(&probe).ok()?;
+    let mut out = vec![Vec::new(); expressions.len()];
+    for s in 0..base.model.data().stretches.len() {
+        let start = base.model.start_of(s, &base.fit.theta);
+        let response = compiled.simulate(&base.model.run_of(s, &theta, &start));
+        for (series, o) in response.outputs.into_iter().zip(&mut out) {
+            o.push(series);
+        }
+    }
+    Some(out)
+}
+
+/// What is known of the signals at each slot.
+fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Option<Signals>> {
+    let data = base.model.data();
+    let simulation = base.model.simulation();
+    let values = base.values();
+    let constant = |e: &Expr| e.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some());
+    let mut expressions: Vec<Expr> = Vec::new();
+    let mut place = BTreeMap::new();
+    for slot in &structure.slots {
+        for (_, quantity) in slot.symbols() {
+            let text = quantity.expression.to_string();
+            place.entry(text).or_insert_with(|| {
+                expressions.push(quantity.expression.clone());
+                expressions.len() - 1
+            });
+        }
+    }
+    let Some(series) = along(base, &expressions) else {
+        return vec![None; structure.slots.len()];
+    };
+    let mut stretches = Vec::new();
+    let mut from = 0;
+    for s in &data.stretches {
+        stretches.push(from..from + s.len());
+        from += s.len();
+    }
+    let start_s = data.stretches.iter().max_by_key(|s| s.len()).map_or(0.0, |s| s.start_s);
+    let _ = &values;
+    structure
+        .slots
+        .iter()
+        .map(|slot| {
+            let mut moving = BTreeMap::new();
+            let mut constants = BTreeMap::new();
+            for (symbol, quantity) in slot.symbols() {
+                let all: Vec<f64> = series.get(*place.get(&quantity.expression.to_string())?)?.concat();
+                if constant(&quantity.expression) {
+                    constants.insert(symbol.to_owned(), *all.first()?);
+                } else {
+                    moving.insert(symbol.to_owned(), all);
+                }
+            }
+            let mut signals = Signals::new(data.period_s, start_s, moving).held(simulation.time.hold);
+            signals.stretches.clone_from(&stretches);
+            signals.constants = constants;
+            signals.peaks_hz = peaks_hz.to_vec();
+            let output =
+                slot.label.strip_prefix("output:").and_then(|c| simulation.outputs.iter().position(|o| o.column == c));
+            if let Some(o) = output {
+                signals.measure(Some(data.stretches.iter().flat_map(|s| s.outputs[o].iter().copied()).collect()));
+            }
+            Some(signals)
+        })
+        .collect()
+}
+
+/// Everything in the catalogue that can be missing in this simulation, with its columns, best score first.
+///
+/// `original` is the user's simulation: slots are those of it, with what stands there now. What looks as if a slot had it already is a
+/// candidate still where it looks so by an effect of another family among `effects`.
+pub fn screen(
+    base: &Base<'_>,
+    original: &Simulation,
+    effects: &[Effect],
+    evidence: &(Projector, Vec<f64>),
+    keep: &dyn Fn(&Mechanism, &Slot) -> bool,
+) -> Vec<Candidate> {
+    let (own, r) = evidence;
+    let document = base.document();
+    let structure = Structure::within(&document, original);
+    let bare = Structure::of(original);
+    let peaks = residual_peaks(base);
+    let at = signals(base, &structure, &peaks);
+    let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();
+    for mechanism in catalogue() {
+        for (place, slot) in structure.slots.iter().enumerate() {
+            let theirs = effects.iter().any(|e| e.slot.label == slot.label && e.mechanism.family == mechanism.family);
+            let added = || !theirs && !bare.slots.iter().any(|b| b.label == slot.label && mechanism.is_in(b));
+            if !mechanism.fits(slot) || (mechanism.is_in(slot) && !added()) || !keep(mechanism, slot) {
+                continue;
+            }
+            if let Some(signals) = at[place].as_ref().filter(|s| mechanism.is_written_from(s)) {
+                work.push((mechanism, &structure.slots[place], signals));
+            }
+        }
+    }
+    let values = base.values();
+    let total = norm2(r);
+    let mut found: Vec<Candidate> = work
+        .par_iter()
+        .filter_map(|(mechanism, slot, signals)| {
+            let screening = mechanism.rewrite(&document, slot, signals, Purpose::Screening).ok()?;
+            let refit = mechanism.rewrite(&document, slot, signals, Purpose::Refit).ok()?;
+            let mut points = features(base, &screening, slot, &values, own, r, total)?;
+            points.sort_by(|a, b| b.score.total_cmp(&a.score));
+            points.iter_mut().skip(JOINT).for_each(|p| p.joint = None);
+            Some(Candidate { mechanism, slot: (*slot).clone(), refit, points, lacking: mechanism.lacking(signals) })
+        })
+        .collect();
+    found.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    found
+}
+
+/// The columns of every point of a screening form.
+fn features(
+    base: &Base<'_>,
+    screening: &Rewritten,
+    slot: &Slot,
+    values: &Values,
+    own: &Projector,
+    r: &[f64],
+    total: f64,
+) -> Option<Vec<Point>> {
+    let data = base.model.data();
+    let starts = screening.starts();
+    let mut points = Vec::new();
+    // Amplitudes at zero; the shapes are values, not unknowns.
+    let mut document = screening.simulation.clone();
+    for shape in &screening.shapes {
+        if let Some(p) = document.parameter_mut(&shape.name) {
+            p.fixed = true;
+        }
+    }
+    let own_states: Vec<String> = base.model.simulation().states.iter().map(|s| s.name.clone()).collect();
+    let model = Model::new(&document, data, &own_states, base.model.substeps()).ok()?;
+    let start = with_added_starts(values, screening, slot, data.stretches.len());
+    let mut theta = model.theta(&start);
+    let places: Vec<usize> = screening.amplitudes.iter().filter_map(|a| model.place_of(&a.name)).collect();
+    for &p in &places {
+        theta[p] = 0.0;
+    }
+    let every = starts.len().div_ceil(kept(data.rows()));
+    let together = starts.chunks(TOGETHER).flat_map(|some| model.tangents_with(&theta, &places, some));
+    for (i, (shapes, tangents)) in starts.iter().zip(together).enumerate() {
+        let Some((_, columns)) = tangents else { continue };
+        let Some(group) = FeatureGroup::new(&columns, &data.layout, &base.whitener, own) else { continue };
+        let amplitudes =
+            screening.amplitudes.iter().map(|a| a.name.clone()).zip(group.amplitudes(r, columns.len())).collect();
+        let score = score(total, group.explained(r), r.len(), group.columns.len());
+        let (concealment, norm) = (group.concealment, group.norm);
+        points.push(Point {
+            shapes: shapes.clone(),
+            group: (i % every == every / 2).then(|| group.clone()),
+            joint: Some(group),
+            concealment,
+            norm,
+            amplitudes,
+            score,
+        });
+    }
+    (!points.is_empty()).then_some(points)
+}
+
+/// The values with a start for each state that an effect added: where the state of the slot that it goes with starts (`x_a` with `x`).
+pub fn with_added_starts(values: &Values, effect: &Rewritten, slot: &Slot, stretches: usize) -> Values {
+    let mut out = values.clone();
+    for name in &effect.states {
+        let symbol = name.split('_').next().unwrap_or(name);
+        let Some(Expr::Symbol(like)) = slot.quantity(symbol).map(|q| &q.expression) else { continue };
+        for s in 0..stretches {
+            if let Some(x) = values.initials.get(&(s, like.clone())) {
+                out.initials.insert((s, name.clone()), *x);
+            }
+        }
+    }
+    out
+}
+
+/// A mechanism written into a document at the slot of that label, scaled by the signals of a calibrated simulation.
+pub fn rewrite_at(
+    base: &Base<'_>,
+    document: &Simulation,
+    original: &Simulation,
+    mechanism: &'static Mechanism,
+    label: &str,
+    purpose: Purpose,
+) -> Option<(Rewritten, Slot)> {
+    let sizes = Structure::within(&base.document(), original);
+    let at = signals(base, &sizes, &residual_peaks(base));
+    let place = sizes.slots.iter().position(|s| s.label == label && mechanism.places.contains(&s.place))?;
+    let structure = Structure::within(document, original);
+    let slot = structure.slots.iter().find(|s| s.label == label && mechanism.places.contains(&s.place))?.clone();
+    let written = mechanism.rewrite(document, &slot, at[place].as_ref()?, purpose).ok()?;
+    Some((written, slot))
+}

@@ -1,0 +1,161 @@
+//! The second look: what a few fitted sets say of a mismatch that the surrogates do not see.
+//!
+//! Surrogates are made of the residual itself. Where much of it is mismatch they carry its shape, two effects that cancel each other show in
+//! no single score, and the margin that an estimated noise model asks for costs power. A set that is fitted, each with a noise model of its
+//! own, is free of all three: what it gains is compared with what the number of sets that were looked at would gain by chance.
+
+use super::Search;
+use super::compose::{short_list, superposed};
+use super::fitting::refit_all;
+use super::hypothesis::{Effect, Hypothesis, block_score};
+use super::rehearsal::by_rehearsal;
+use super::screen::Candidate;
+use crate::data::DataSet;
+use crate::evidence::NoiseModel;
+use crate::mechanism::{Places, Rewritten, Shape};
+use crate::model::base::spared;
+use crate::openset::OpenSet;
+use crate::verdict::weigh::better_by_chance;
+
+/// Effects and pairs that are fitted for a second look.
+const LOOKED_AT: (usize, usize) = (5, 4);
+/// Share of the residual's power that an effect must take where the residual is mismatch throughout.
+const LARGE: f64 = 0.25;
+/// Log evidence that speaks for a set there, without its share of the power.
+const SURE: f64 = 15.0;
+/// Share of the squared error on held-out blocks that noise never takes away.
+const HALF: f64 = 0.5;
+/// Odds against a mismatch before the recording is looked at. The noise model is an estimate: on recordings in which nothing is missing the best
+/// of the sets gains more than chance alone would give it, and the odds must allow for that.
+pub const ODDS_AGAINST: f64 = 1000.0;
+/// Odds against something more where a mismatch is known.
+pub const ODDS_AGAINST_MORE: f64 = 10.0;
+/// Moments of a recording that are apart for an effect that begins at one of them.
+const MOMENTS: f64 = 25.0;
+/// Log evidence that a set of nothing but drifts and offsets must bring besides: noise that rises towards low frequency does what they do,
+/// process noise on a drive above all.
+pub const SLOW: f64 = 8.0;
+
+/// Share of the level that each test of a second look has: sets, rehearsals and generic terms are three tests that a recording must pass in which
+/// nothing is missing, beside the surrogates.
+const OF_THREE: f64 = 1.0 / 3.0;
+
+/// Lines of a recording's spectrum among which the residual itself pointed to one, for each of an effect's shapes that is such a line.
+pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
+    let lines = |shape: &Shape| if shape.places == Places::Lines { (0.5 * data.rows() as f64).max(1.0) } else { 1.0 };
+    effect.shapes.iter().map(lines).product()
+}
+
+/// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
+pub fn unlikely(open: &OpenSet, odds_against: f64) -> f64 {
+    if open.block_ratio < 1.0 { (odds_against * (-open.gain).exp()).min(1.0) } else { 1.0 }
+}
+
+impl<'d> Search<'_, 'd> {
+    /// The likeliest effects and pairs, fitted; and what is there or not (a sensor that shows the size only), of which no derivative at
+    /// nothing tells how likely it is.
+    pub fn glance(&self, start: &Hypothesis<'d>, candidates: &[Candidate]) -> Vec<Hypothesis<'d>> {
+        let mut list = short_list(candidates, LOOKED_AT.0);
+        for c in candidates.iter().filter(|c| c.refit.amplitudes.is_empty() && c.refit.shapes.is_empty()) {
+            if c.lacking.is_none() && list.iter().all(|l| l.key() != c.key()) {
+                list.push(c);
+            }
+        }
+        let mut fitted = refit_all(&self.setting, start, &list);
+        fitted.extend(superposed(&self.setting, start, candidates, LOOKED_AT.1));
+        fitted
+    }
+
+    /// A bound for the probability that a set gains so much evidence where nothing is missing, if the set predicts blocks that it was not
+    /// fitted to no worse than the simulation as it is.
+    ///
+    /// A ratio of evidences exceeds `x` by chance with a probability of at most `1/x` (Markov);
+    /// there are as many sets as can be made of the candidates.
+    pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
+        let sets = |h: &Hypothesis<'_>| {
+            (0..h.effects.len())
+                .map(|i| {
+                    (candidates.saturating_sub(i) as f64 / (i + 1) as f64).max(1.0) * self.places_of(&h.effects[i])
+                })
+                .product::<f64>()
+        };
+        // A set that leaves white noise has no colour left to choose: it need not allow for those that noise may have.
+        let spared_by = |h: &Hypothesis<'_>| {
+            let noise = if h.base.whitener.coefficients() > 0 { &h.base.whitener } else { &start.base.whitener };
+            spared(self.setting.data, noise, &start.base.whitener)
+        };
+        let evidence = |h: &Hypothesis<'_>| {
+            let slow = h.effects.iter().all(|e| e.mechanism.family.is_slow_noise());
+            h.log_evidence + spared_by(h) - if slow { SLOW } else { 0.0 }
+        };
+        let none = start.log_evidence + spared_by(start);
+        let bound = |h: &Hypothesis<'_>| ODDS_AGAINST * sets(h) * (none - evidence(h)).exp();
+        let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
+        let p = bound(best).min(1.0);
+        (p < self.level() && self.predicts_blocks(start, best)).then_some(p)
+    }
+
+    /// The level of each test of the second look.
+    fn level(&self) -> f64 {
+        OF_THREE * self.options.alpha
+    }
+
+    /// A bound for the probability that generic terms gain so much where nothing is missing, below the level.
+    pub fn by_terms(&self, start: &Hypothesis<'d>) -> Option<f64> {
+        self.open(start).map(|o| unlikely(&o, ODDS_AGAINST)).filter(|p| *p < self.level())
+    }
+
+    /// Whether a set predicts blocks that it was not fitted to better than the simulation as it is.
+    fn predicts_blocks(&self, start: &Hypothesis<'d>, set: &Hypothesis<'d>) -> bool {
+        let squares = |h| block_score(&self.setting, h).map(|(_, squares)| squares.iter().sum::<f64>());
+        matches!((squares(start), squares(set)), (Some(before), Some(after)) if after < before)
+    }
+
+    /// The probability, below the level, that the likeliest effects gain so much where nothing is missing, by simulation.
+    /// Asked only where the noise is known below the lowest line (of 1/f noise no recording tells how it goes on there, and simulations of
+    /// it would promise too much), and where a set of those that were `fitted` predicts blocks better.
+    pub fn by_rehearsal(
+        &self,
+        none: &Hypothesis<'d>,
+        fitted: &[Hypothesis<'d>],
+        candidates: &[Candidate],
+        plain: Option<&(Hypothesis<'d>, Vec<Candidate>)>,
+    ) -> Option<f64> {
+        let level = self.level();
+        let noise = &none.base.whitener;
+        if !noise.models.iter().all(NoiseModel::is_known_below) {
+            return None;
+        }
+        let quick = |h: &&Hypothesis<'_>| h.effects.iter().any(|e| !e.mechanism.family.is_slow_noise());
+        let best = fitted.iter().filter(quick).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        // The rehearsal takes far longer than what else is asked.
+        if best.log_evidence <= none.log_evidence || !self.predicts_blocks(none, best) {
+            return None;
+        }
+        (self.hooks.progress)("rehearsing on simulated recordings in which nothing is missing");
+        by_rehearsal(&self.setting, none, candidates, plain, level, self.options.seed).filter(|p| *p < level)
+    }
+
+    /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.
+    fn places_of(&self, effect: &Effect) -> f64 {
+        let moments = effect.written.shapes.iter().filter(|shape| shape.places == Places::Moments).count();
+        lines_of(self.setting.data, &effect.written) * MOMENTS.powi(moments as i32)
+    }
+
+    /// The same where the residual is mismatch throughout and no noise model can be had: a set that takes [`LARGE`] of its power or brings
+    /// [`SURE`] of log evidence, and predicts blocks that it was not fitted to better, is no accident. Nor is one that leaves [`HALF`] of the
+    /// squared error on such blocks, however few they are. The p-value is that of the difference on the blocks.
+    pub fn on_blocks(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>]) -> Option<f64> {
+        let best = fitted.iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let rows = self.setting.noise.share() * self.setting.data.rows() as f64;
+        let large = best.base.log_likelihood - start.base.log_likelihood > -0.5 * rows * (1.0 - LARGE).ln();
+        if !large && best.log_evidence - start.log_evidence < SURE {
+            return None;
+        }
+        let (_, before) = block_score(&self.setting, start)?;
+        let (_, after) = block_score(&self.setting, best)?;
+        let p = (better_by_chance(&before, &after)? * fitted.len() as f64).min(1.0);
+        let halved = after.iter().sum::<f64>() < HALF * before.iter().sum::<f64>();
+        (p < self.options.alpha || halved).then_some(p)
+    }
+}

@@ -1,0 +1,109 @@
+//! How firmly the members of the winning set are named: their support among all sets that were fitted, less what speaks against trusting it.
+
+use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights};
+use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
+use crate::mechanism::Family;
+use crate::search::hypothesis::Hypothesis;
+
+/// Share of the set's log evidence that a member must bring: laws are written only so exactly, and beside a large effect the rest of its own
+/// law looks like a small one.
+const TRIFLE: f64 = 0.02;
+
+/// Log likelihood by which a set must trail before the recording refutes it.
+const REFUTED: f64 = 4.0;
+/// The same between shifts in time that pass between samples: whether a winding starts with its current or without it shows in all of a
+/// motion that is integrated, and no law tells how a recording began.
+const REFUTED_BUT_FOR_THE_START: f64 = 60.0;
+
+/// Probabilities of the sets of a pool.
+pub fn likelihoods(
+    pool: &[Hypothesis<'_>],
+    weighed: &[Weighed],
+    blocks: &[Option<(f64, Vec<f64>)>],
+    winner: usize,
+    imperfect: bool,
+) -> Vec<f64> {
+    let weight = if imperfect { IMPERFECT_WEIGHT } else { EVIDENCE_WEIGHT };
+    probabilities(&log_weights(pool, weighed, blocks, winner, weight), 1.0)
+}
+
+/// The support of each member of the winning set, never firm where something shows that the set is not the whole truth.
+pub fn firmness(
+    pool: &[Hypothesis<'_>],
+    weighed: &[Weighed],
+    probability: &[f64],
+    winner: usize,
+    imperfect: bool,
+) -> Vec<Support> {
+    let best = &pool[winner];
+    let claims = &weighed[winner].claims;
+    let mut support = supports(claims, weighed, probability);
+    // A set that leaves something significant may stand in for something else; what is still far from the recording is not understood,
+    // whatever was gained; and three members imitate almost anything: on development cases such sets were wrong more often than right.
+    let doubtful = imperfect || best.base.far() || claims.len() > 2;
+    for (i, (e, s)) in best.effects.iter().zip(&mut support).enumerate() {
+        // Two members of one family in one set: something of that kind, but neither of them as it stands.
+        let twice = claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family);
+        let own = e.mechanism.family;
+        // A fractional element is a relaxation and a mode within the band that was excited.
+        let of_a_spectrum =
+            own.extends_a_spectrum() && best.effects.iter().any(|o| o.mechanism.family == Family::LinearMemory);
+        let vague = own.stands_for_others() || of_a_spectrum || trifle(pool, winner, i) || has_twin(pool, winner, i);
+        if doubtful || twice || vague {
+            s.weaken();
+        }
+        if bounded(&best.base, e) || e.mechanism.family.members_imitate() || e.written.sum_of_others {
+            s.mechanism = s.mechanism.min(NOT_FIRM);
+        }
+    }
+    support
+}
+
+/// Whether a set is a sum of relaxations: two members with a linear memory, or one beside a mode at the same slot. One relaxation is an element; two in
+/// one recording are what a memory with many time scales looks like (a fractional element), and the catalogue has no law of that kind.
+pub fn is_a_spectrum(h: &Hypothesis<'_>) -> bool {
+    let memories = h.effects.iter().enumerate().filter(|(_, e)| e.mechanism.family == Family::LinearMemory);
+    memories.into_iter().any(|(i, memory)| {
+        h.effects.iter().enumerate().any(|(j, other)| {
+            let more = match other.mechanism.family {
+                Family::LinearMemory => true,
+                Family::ExtraMode => other.slot.label == memory.slot.label,
+                _ => false,
+            };
+            i != j && more
+        })
+    })
+}
+
+/// Whether a member of a set adds next to nothing beside what the others explain, where the set without it was fitted.
+fn trifle(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
+    let rest = pool[winner].key_without(member);
+    let whole = pool[winner].log_evidence - pool[0].log_evidence;
+    !rest.is_empty()
+        && pool.iter().any(|h| h.key() == rest && pool[winner].log_evidence - h.log_evidence < TRIFLE * whole)
+}
+
+/// Whether a set with a member of the twin family in this member's place follows the recording as well. That it needs a parameter more makes
+/// it less likely, but refutes nothing: what is named firmly must be what the recording demands.
+fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
+    let best = &pool[winner];
+    let Some(twin) = best.effects[member].mechanism.family.twin() else { return false };
+    let rest = best.key_without(member);
+    let refuted = if passes_between_samples(best, member) { REFUTED_BUT_FOR_THE_START } else { REFUTED };
+    pool.iter().any(|h| {
+        let of_twin = h.effects.iter().position(|e| e.mechanism.family == twin);
+        h.effects.len() == best.effects.len()
+            && of_twin.is_some_and(|place| h.key_without(place) == rest)
+            && h.base.log_likelihood > best.base.log_likelihood - refuted
+    })
+}
+
+/// Whether a member is a lag shorter than a sample: its transient passes between the samples, where a delay, a lag of a sensor and that of a
+/// winding are all the same shift in time, and what is left to tell them apart is how the recording began.
+fn passes_between_samples(h: &Hypothesis<'_>, member: usize) -> bool {
+    let effect = &h.effects[member];
+    let values = h.base.values();
+    effect.mechanism.family == Family::SignalPathLag
+        && (effect.written.shapes.iter().filter_map(|shape| values.parameters.get(&shape.name)))
+            .all(|tau| *tau < h.base.model.data().period_s)
+}

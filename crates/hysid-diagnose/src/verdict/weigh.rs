@@ -1,0 +1,324 @@
+//! Weighing fitted hypotheses: evidence, blocks that were held out of the fit, and what a law that contains another must pay.
+
+use std::f64::consts::TAU;
+
+use rayon::prelude::*;
+
+use super::{Claim, FIRM, Hypothesis as Weighed};
+use crate::evidence::norm2;
+use crate::experiment::SETTLED;
+use crate::model::base::Base;
+use crate::search::budget::Step;
+use crate::search::compose::best_of;
+use crate::search::hypothesis::{Effect, Hypothesis, Setting, block_score};
+
+/// Weight of the log evidence in the probabilities.
+pub const EVIDENCE_WEIGHT: f64 = 0.4;
+/// The same where something significant is left of the best set: all models are then known to be wrong.
+pub const IMPERFECT_WEIGHT: f64 = 0.2;
+/// Weight of the evidence between members of one family: two laws of one kind differ by how they are written as much as by what they say.
+const SIBLING_WEIGHT: f64 = 0.25;
+/// Log likelihood below which a law that contains another has gained nothing on it, and the weight of the evidence between the two.
+const NESTED_GAIN: f64 = 2.0;
+const NESTED_WEIGHT: f64 = 0.9;
+/// Log evidence that a further effect must bring before it counts.
+const PRICE_OF_AN_EFFECT: f64 = 4.0;
+
+/// A fitted set as the verdict sees it: what it claims, and its evidence less the price of its effects.
+pub fn weigh(h: &Hypothesis<'_>) -> Weighed {
+    let claim =
+        |e: &Effect| Claim { mechanism: e.mechanism.id, family: e.mechanism.family.name(), slot: e.slot.label.clone() };
+    Weighed {
+        claims: h.effects.iter().map(claim).collect(),
+        log_evidence: h.log_evidence - PRICE_OF_AN_EFFECT * h.effects.len() as f64,
+    }
+}
+
+/// The set with the most evidence of those that claim something.
+pub fn likeliest(weighed: &[Weighed]) -> Option<usize> {
+    (0..weighed.len())
+        .filter(|&i| !weighed[i].claims.is_empty() && weighed[i].log_evidence.is_finite())
+        .max_by(|&a, &b| weighed[a].log_evidence.total_cmp(&weighed[b].log_evidence))
+}
+
+/// The sets that were fitted, as they stand against each other.
+#[derive(Debug, Clone, Copy)]
+pub struct Contest<'a, 'd> {
+    /// The sets; the first is the simulation without effects.
+    pub pool: &'a [Hypothesis<'d>],
+    /// Their claims and evidence.
+    pub weighed: &'a [Weighed],
+    /// Their probabilities.
+    pub probability: &'a [f64],
+    /// The one that is told.
+    pub winner: usize,
+}
+
+/// Sets that contradict the winner, one by evidence and one by probability: each names a mechanism that the other does not (a set with more or
+/// fewer members than the winner says the same of those that they share). Two, since one of them is often the winner's law in other words.
+pub fn rivals_of(contest: &Contest<'_, '_>) -> Vec<usize> {
+    let Contest { pool, weighed, probability, winner } = *contest;
+    let lacks = |i: usize, j: usize| {
+        pool[i].effects.iter().any(|e| pool[j].effects.iter().all(|other| other.mechanism.id != e.mechanism.id))
+    };
+    let rivals = || (0..pool.len()).filter(|&i| lacks(i, winner) && lacks(winner, i));
+    let by_evidence = rivals().max_by(|&a, &b| weighed[a].log_evidence.total_cmp(&weighed[b].log_evidence));
+    let likeliest =
+        rivals().max_by(|&a, &b| probability[a].total_cmp(&probability[b])).filter(|r| Some(*r) != by_evidence);
+    by_evidence.into_iter().chain(likeliest).collect()
+}
+
+/// Whether the recording has settled the matter between two sets: what it makes of them is far apart, and the odds are firm. What keeps such
+/// a verdict from being firm is something else, and no experiment between the two is needed.
+pub fn settled(winner: f64, rival: f64, separation: Option<f64>) -> bool {
+    separation.is_some_and(|s| s >= SETTLED) && winner >= FIRM * (winner + rival)
+}
+
+/// Scores on held-out blocks of the hypotheses that are close to the best; `None` for the others.
+pub fn block_scores(setting: &Setting<'_>, pool: &[Hypothesis<'_>]) -> Vec<Option<(f64, Vec<f64>)>> {
+    let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut near: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].log_evidence > top - 8.0).collect();
+    near.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
+    near.truncate(5);
+    (0..pool.len())
+        .into_par_iter()
+        .map(|i| {
+            if (near.contains(&i) || i == 0)
+                && pool.len() > 1
+                && (i == 0 || pool[i].log_evidence >= top || !setting.budget.omits(Step::Blocks))
+            {
+                block_score(setting, &pool[i])
+            } else {
+                None
+            }
+        })
+        .collect()
+}
+
+/// The standing set, or one of its size that ties in evidence and predicts the held-out blocks better.
+pub fn tie_broken(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>]) -> usize {
+    let Some(standing) = best_of(pool) else { return 0 };
+    let score = |i: usize| blocks[i].as_ref().map_or(f64::NEG_INFINITY, |b| b.0);
+    (0..pool.len())
+        .filter(|&i| {
+            pool[i].effects.len() == pool[standing].effects.len()
+                && pool[i].log_evidence > pool[standing].log_evidence - 3.0
+        })
+        .filter(|&i| i == standing || score(i) > score(standing) + 3.0)
+        .max_by(|&a, &b| score(a).total_cmp(&score(b)))
+        .unwrap_or(standing)
+}
+
+/// Mean and standard error of `a - b` over stretches of 20 rows (neighbouring errors are no independent witnesses); `None` for
+/// fewer than five stretches.
+fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
+    let differences: Vec<f64> =
+        a.chunks(20).zip(b.chunks(20)).map(|(a, b)| a.iter().sum::<f64>() - b.iter().sum::<f64>()).collect();
+    let count = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / count.max(1.0);
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    (count > 4.0).then_some((mean, (variance / count).sqrt()))
+}
+
+/// Whether the winner predicts the held-out blocks worse than the simulation as it is, by more than a standard error: an effect that acts at a few
+/// moments only may leave all blocks as they are.
+pub fn worse_on_blocks(blocks: &[Option<(f64, Vec<f64>)>], winner: usize) -> bool {
+    let (Some(Some((_, none))), Some(Some((_, best)))) = (blocks.first(), blocks.get(winner)) else { return false };
+    difference(best, none).is_some_and(|(mean, error)| mean > error)
+}
+
+/// Probability that squared errors on blocks fall by so much by chance, one-sided; `None` where the blocks are too few.
+pub fn better_by_chance(before: &[f64], after: &[f64]) -> Option<f64> {
+    let (mean, error) = difference(before, after)?;
+    let t = mean / error.max(f64::MIN_POSITIVE);
+    let count = before.chunks(20).count() as f64;
+    let law = statrs::distribution::StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
+    Some(1.0 - statrs::distribution::ContinuousCDF::cdf(&law, t))
+}
+
+/// Whether a parameter of the effect stands at a bound: the law is stretched to what it was not made for, a sibling may be meant.
+pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
+    let places = effect.written.parameters_of();
+    places.iter().filter_map(|n| base.model.place_of(n)).any(|place| base.fit.at_bound[place])
+}
+
+/// What a set says of each of its effects, in an order of its own.
+fn sorted<'h, T: Ord>(h: &'h Hypothesis<'_>, of: impl Fn(&'h Effect) -> T) -> Vec<T> {
+    let mut all: Vec<T> = h.effects.iter().map(of).collect();
+    all.sort_unstable();
+    all
+}
+
+/// Whether two sets say the same of families and slots and differ in members only.
+fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
+    fn kind(e: &Effect) -> (&str, &str) {
+        (e.mechanism.family.name(), &e.slot.label)
+    }
+    sorted(a, kind) == sorted(b, kind)
+}
+
+/// Squared difference of two predictions, in units of the noise, and difference of their log evidence, below which no recording of this length
+/// tells them apart.
+const SAME: f64 = 1.0;
+/// Log evidence by which a set may trail and its other wordings still matter.
+const NEAR: f64 = 12.0;
+
+/// How many sets say in other words what each one says: as many effects of the same families, and the same prediction. An offset of the input and
+/// one of the sensor of a linear plant are one statement; told twice, they would count twice against another family.
+fn wordings(pool: &[Hypothesis<'_>], winner: usize) -> Vec<usize> {
+    let best = &pool[winner];
+    let families: Vec<Vec<&str>> = pool.iter().map(|h| sorted(h, |e| e.mechanism.family.name())).collect();
+    let layout = &best.base.model.data().layout;
+    let same = |a: &Hypothesis<'_>, b: &Hypothesis<'_>| {
+        let difference: Vec<f64> = a.base.fit.residual.iter().zip(&b.base.fit.residual).map(|(a, b)| a - b).collect();
+        norm2(&best.base.whitener.apply(layout, &difference)) < SAME
+    };
+    (0..pool.len())
+        .map(|i| {
+            let near = |j: usize| (pool[i].log_evidence - pool[j].log_evidence).abs() < SAME;
+            if pool[i].log_evidence < best.log_evidence - NEAR {
+                return 1;
+            }
+            let others = (0..pool.len()).filter(|&j| j != i && families[j] == families[i] && near(j));
+            1 + others.filter(|&j| same(&pool[i], &pool[j])).count()
+        })
+        .collect()
+}
+
+/// How much of the price of its further parameters a set pays too much that contains another as a special case.
+///
+/// Half of `ln n` is right for a parameter that the recording settles as well as one of its samples times the number of samples. A power that
+/// hardly shows is settled far worse, and that it may have any value then says nothing against it: its price is the logarithm of
+/// how many times its interval goes into what was allowed beforehand (Laplace's approximation), for those that are settled worst. A further
+/// amplitude is another matter: the recording settles that it is zero.
+fn overpriced(general: &Hypothesis<'_>, special: &Hypothesis<'_>) -> f64 {
+    let amplitudes = |h: &Hypothesis<'_>| h.effects.iter().map(|e| e.written.amplitudes.len()).sum::<usize>();
+    let price = |h: &Hypothesis<'_>| h.base.log_likelihood - h.log_evidence;
+    let further = general.base.model.unknowns().len().saturating_sub(special.base.model.unknowns().len());
+    let paid = price(general) - price(special);
+    if further == 0 || paid <= 0.0 || amplitudes(general) != amplitudes(special) {
+        return 0.0;
+    }
+    let unit = paid / further as f64;
+    let base = &general.base;
+    let covariance = base.covariance();
+    let mut prices: Vec<f64> = general
+        .effects
+        .iter()
+        .flat_map(|e| e.written.widths())
+        .filter_map(|(name, width)| {
+            let place = base.model.place_of(&name)?;
+            let variance = covariance[place * (base.fit.theta.len() + 1)];
+            let times = if variance > 0.0 { width / (TAU * variance).sqrt() } else { 1.0 };
+            // At a bound the law is the special case or stretched: nothing was settled badly.
+            (!base.fit.at_bound[place]).then(|| times.max(1.0).ln().min(unit))
+        })
+        .collect();
+    prices.sort_by(f64::total_cmp);
+    prices.iter().take(further).map(|price| unit - price).sum()
+}
+
+/// Logarithms of the weights of the hypotheses.
+///
+/// Evidence counts with `weight`; what the held-out blocks say is part of it. A law that contains the winner's as a special case and gains
+/// nothing on it pays nearly the full price of its further parameters: data that settle a parameter at its neutral value do speak.
+pub fn log_weights(
+    pool: &[Hypothesis<'_>],
+    weighed: &[Weighed],
+    blocks: &[Option<(f64, Vec<f64>)>],
+    winner: usize,
+    weight: f64,
+) -> Vec<f64> {
+    let best_block = blocks[winner].as_ref().map(|b| b.0);
+    let best = &pool[winner];
+    let wordings = wordings(pool, winner);
+    pool.iter()
+        .enumerate()
+        .map(|(i, h)| {
+            let sibling = i != winner && siblings(h, best);
+            let contains = i != winner
+                && h.effects.len() == best.effects.len()
+                && h.effects
+                    .iter()
+                    .any(|e| best.effects.iter().any(|w| e.mechanism.contains.contains(&w.mechanism.id)));
+            let behind = (h.log_evidence - best.log_evidence).min(0.0);
+            // What it trails by for its price alone; no set becomes likelier than the winner by it.
+            let refund = if contains && sibling { overpriced(h, best).min(-behind) } else { 0.0 };
+            let behind = behind + refund;
+            let mut log = weight * (weighed[i].log_evidence + refund);
+            if let (Some(own), Some(best)) = (&blocks[i], best_block) {
+                log += 0.5 * weight * (own.0 - best).clamp(-10.0, 10.0);
+            }
+            if sibling {
+                log = log.max(log + (SIBLING_WEIGHT - weight) * behind);
+            }
+            if contains && h.base.log_likelihood - best.base.log_likelihood < NESTED_GAIN {
+                log += (NESTED_WEIGHT - weight).max(0.0) * behind;
+            }
+            log - (wordings[i] as f64).ln()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+#[path = "../../tests/common/oscillator.rs"]
+pub(crate) mod oscillator;
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
+    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use super::*;
+    use crate::data::DataSet;
+    use crate::model::base::NoiseKind;
+    use crate::search::budget::Budget;
+    use crate::search::fitting::refit;
+    use crate::search::hypothesis::calibrated;
+    use crate::search::screen::screen;
+
+    #[test]
+    fn blocks_veto_what_they_refute_and_not_what_they_do_not_show() {
+        let mut random = normal(8);
+        let none: Vec<f64> = (0..400).map(|_| random().powi(2)).collect();
+        let judged = |of_best: Vec<f64>| worse_on_blocks(&[Some((0.0, none.clone())), Some((0.0, of_best))], 1);
+        // One effect leaves all blocks as they are but for what its parameters cost, one is better, one is worse throughout.
+        assert!(!judged(none.clone()));
+        assert!(!judged(none.iter().enumerate().map(|(i, e)| e + if i % 40 < 20 { 0.1 } else { -0.099 }).collect()));
+        assert!(!judged(none.iter().map(|e| 0.8 * e).collect()));
+        assert!(judged(none.iter().map(|e| 1.2 * e).collect()));
+    }
+
+    /// A small offset of a sensor and one of the input leave the same; a spring that bends says something else.
+    #[test]
+    fn an_offset_of_input_and_sensor_are_one_statement() {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut random = normal(3);
+        let u = drive(800, &mut random);
+        let mut y = respond(&u, REAL, |_, _| 0.0);
+        let noise = 0.02 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * (random() + 0.1));
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let wanted = ["input_offset", "output_offset", "cubic_stiffness"];
+        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| wanted.contains(&m.id));
+        let fitted = |id: &str| refit(&setting, &none, found.iter().find(|c| c.mechanism.id == id).unwrap()).unwrap();
+        let mut pool: Vec<Hypothesis<'_>> = wanted.into_iter().map(fitted).collect();
+        pool.push(none);
+        assert_eq!(wordings(&pool, 0), [2, 2, 1, 1]);
+        // Together they weigh what one alone does.
+        let weigh_all = |pool: &[Hypothesis<'_>]| {
+            let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
+            log_weights(pool, &weighed, &vec![None; pool.len()], 0, 0.4)
+        };
+        let both = weigh_all(&pool);
+        pool.remove(1);
+        let alone = weigh_all(&pool);
+        let sum = both[0] + (both[1] - both[0]).exp().ln_1p();
+        assert!((sum - alone[0]).abs() < 0.2, "{both:?} {alone:?}");
+    }
+}
