@@ -2,8 +2,8 @@
 
 use hysid_plant::{Compiled, Effort, Settings, Simulation};
 
-use crate::column::plant_data;
 use crate::data::DataSet;
+use crate::data::plant::plant_data;
 use crate::model::{Model, Values};
 
 /// Integration steps in each sampling period where the step-halving check gives no number.

@@ -5,11 +5,11 @@
 //! whole gain for itself. Steps are chosen for the simulation without effects: a lag within a sampling period, a stop or an elastic contact asks
 //! for shorter ones, and the set with the smallest error of integration would win and not the true one.
 
+use super::fair::WORSE;
 use super::global::MOST_SUBSTEPS;
 use crate::evidence::norm2;
 use crate::model::Model;
 use crate::model::base::Base;
-use crate::search::WORSE;
 use crate::search::hypothesis::{Hypothesis, Setting};
 
 /// Sets, the likeliest first, that are asked.

@@ -7,7 +7,7 @@
 
 mod clones;
 
-use hysid_plant::{BinaryOp, Compiled, Data, Expr, Simulation};
+use hysid_plant::{BinaryOp, Expr, Simulation};
 use hysid_signal::{Channel, Recording};
 
 use crate::answer::bootstrap::rms;
@@ -186,22 +186,6 @@ impl StandIn {
             format!("Parameters of the simulator are not those of the recording: {}. This is a parameter error, no missing physics.", parts.join(", "))
         })
     }
-}
-
-/// Data of `hysid-plant` for each stretch.
-pub fn plant_data(compiled: &Compiled, data: &DataSet) -> Option<Vec<Data>> {
-    let states = compiled.simulation().states.len();
-    data.stretches
-        .iter()
-        .map(|s| {
-            let mut d = Data::new(compiled, "", s.drive.clone(), s.outputs.clone()).ok()?;
-            d.offset = s.samples.start;
-            if s.samples.start > 0 {
-                d.free = (0..states).collect();
-            }
-            Some(d)
-        })
-        .collect()
 }
 
 #[cfg(test)]

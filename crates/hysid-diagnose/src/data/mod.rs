@@ -5,6 +5,7 @@
 
 mod cut;
 pub mod intake;
+pub mod plant;
 mod thinning;
 mod windows;
 

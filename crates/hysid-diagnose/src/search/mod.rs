@@ -1,4 +1,4 @@
-//! The search for a set of effects: calibration of what there is, test, refit of the likeliest, composition.
+//! The search for a set of effects: what could be missing, the test, refit of the likeliest, composition.
 
 pub mod assemble;
 pub mod budget;
@@ -23,9 +23,8 @@ use crate::error::DiagnoseError;
 use crate::evidence::{Contender, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::mechanism::{Family, Mechanism};
 use crate::model::base::{Base, NoiseKind};
-use crate::model::{Model, Values};
 use crate::openset::{OpenSet, correction};
-use crate::request::{Hooks, Options, Question, Request};
+use crate::request::{Hooks, Options, Question};
 use crate::slot::Slot;
 use budget::Step;
 use compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short_list, unheard};
@@ -33,47 +32,6 @@ use fitting::{refit, refit_all, refit_wider};
 use hypothesis::{Hypothesis, Key, Setting};
 use screen::{Candidate, screen};
 use second_look::{ODDS_AGAINST_MORE, SLOW, unlikely};
-
-/// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
-pub const WORSE: f64 = 1.05;
-
-/// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
-pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Base<'d>, DiagnoseError> {
-    let simulation = request.simulation;
-    let bad =
-        |e: hysid_plant::Error| DiagnoseError::Simulation { file: request.file.to_owned(), problem: e.to_string() };
-    let model = Model::new(simulation, setting.data, &setting.own_states, setting.substeps).map_err(bad)?;
-    let start = model.theta(&Values::default());
-    let diverged = model.simulate(&start).1;
-    let mut best: Option<Base<'d>> = None;
-    let (starts, substeps) = crate::calibration::global::starts(&model, simulation, request.options.seed);
-    setting.substeps = substeps;
-    for from in starts {
-        let Some(b) = setting.fit(simulation, &from, None, 1, 25) else { continue };
-        let cost = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual);
-        if best.as_ref().is_none_or(|x| cost(&b) < cost(x)) {
-            best = Some(b);
-        }
-    }
-    let Some(best) = best else {
-        let (stretch, sample) = diverged.unwrap_or((0, 0));
-        let s = &setting.data.stretches[stretch];
-        return Err(DiagnoseError::Explodes {
-            file: request.file.to_owned(),
-            recording: setting.data.recordings[s.recording].clone(),
-            at_s: s.start_s + sample as f64 * setting.data.period_s,
-        });
-    };
-    let rms = |b: &Base<'_>| crate::evidence::norm2(&b.fit.residual).sqrt();
-    // Under its own noise, twice.
-    let polished = setting.further(&best, Some(&best.whitener), 2, 20);
-    Ok(match polished {
-        // Noise of any colour may not explain what the simulation can. Where it is a force through the plant the plain squares are no judge:
-        // parameters follow its slow wander, and an effect that is fitted under the noise would win by undoing that.
-        Some(p) if p.log_likelihood > best.log_likelihood && (p.driven() || rms(&p) < WORSE * rms(&best)) => p,
-        _ => best,
-    })
-}
 
 /// Composition goes on while the mismatch that remains is significant at this level.
 const STOP_LEVEL: f64 = 0.02;
