@@ -1,8 +1,9 @@
 //! Sets of effects written into a simulation together: from parts with start values to a hypothesis, on to its end, and without one of them.
 
-use super::fitting::{finish, set, starts};
+use super::finish::finish;
 use super::hypothesis::{Effect, Hypothesis, Setting};
 use super::screen::{Candidate, rewrite_at, with_added_starts};
+use super::starts::{set, starts};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Purpose};
 use crate::model::Values;

@@ -6,7 +6,7 @@
 
 use super::assemble::{Part, assemble};
 use super::budget::Step;
-use super::fitting::finish;
+use super::finish::finish;
 use super::hypothesis::{Effect, Hypothesis, Setting};
 use super::screen::rewrite_at;
 use crate::mechanism::{Law, Purpose, Role};

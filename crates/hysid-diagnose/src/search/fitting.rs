@@ -1,59 +1,17 @@
 //! Fitting effects: from a candidate of the screening, or a list of them, to a hypothesis.
 //!
-//! A few iterations tell who is hopeless; the others are fitted from several starts. Shapes that least squares cannot move (a time, a period,
-//! a knee) are searched line by line with the other unknowns refitted.
+//! A few iterations tell who is hopeless; the others are fitted from several starts and to their end.
 
-use hysid_plant::Simulation;
 use rayon::prelude::*;
 
 use super::budget::Step;
 use super::finer::finer;
+use super::finish::finish;
 use super::hypothesis::{Effect, Hypothesis, Setting};
 use super::screen::{Candidate, with_added_starts};
-use crate::calibration::global::calibrated_copy;
-use crate::calibration::unfold::calibrated_unfolded;
+use super::starts::{set, starting_values, starts};
 use crate::model::Values;
 use crate::model::base::Base;
-
-/// Points of a shape grid that a refit starts from.
-const MOST_POINTS: usize = 3;
-
-/// Starts of a refit: the best points of the grid that are no neighbours of each other, and the gentlest.
-pub fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
-    let named = |point: &crate::search::screen::Point| -> Vec<(String, f64)> {
-        let mut values = point.shapes.clone();
-        for (name, amplitude) in &point.amplitudes {
-            values.push((name.clone(), *amplitude));
-        }
-        values
-    };
-    let mut out: Vec<Vec<(String, f64)>> = Vec::new();
-    let Some(best) = candidate.points.first() else { return out };
-    out.push(named(best));
-    let far = |a: &[(String, f64)], b: &[(String, f64)]| {
-        a.iter().zip(b).any(|((_, x), (_, y))| (x - y).abs() > 0.6 * x.abs().max(y.abs()))
-    };
-    let mut apart = vec![best];
-    for p in &candidate.points[1..] {
-        if apart.len() < MOST_POINTS && apart.iter().all(|q| far(&p.shapes, &q.shapes)) {
-            apart.push(p);
-            out.push(named(p));
-        }
-    }
-    if let [_, .., last] = candidate.refit.amplitudes.as_slice() {
-        // Beside another the last amplitude may have the wrong sign at zero, where friction that sticks is nothing like its derivative.
-        let mut turned = named(best);
-        turned.iter_mut().filter(|(name, _)| *name == last.name).for_each(|(_, value)| *value = -*value);
-        out.push(turned);
-    }
-    if candidate.refit.amplitudes.is_empty() && !candidate.refit.neutral.is_empty() {
-        // Only shapes: the effect's strength is in them, and the point's weight says how strong.
-        let weight = best.amplitudes.first().map_or(1.0, |a| a.1.clamp(0.05, 1.0));
-        let neutral = |name: &str| candidate.refit.neutral.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
-        out.push(best.shapes.iter().map(|(n, v)| (n.clone(), neutral(n) + weight.sqrt() * (v - neutral(n)))).collect());
-    }
-    out
-}
 
 /// A few iterations from a candidate's best start, the first of `froms`; from the last two as well (the user's own parameters and a global
 /// calibration) where the fit without the effect is far off.
@@ -69,52 +27,6 @@ fn sketch<'d>(
         .filter(|(i, _)| *i == 0 || (*i + 2 >= froms.len() && parent.base.far()))
         .filter_map(|(_, from)| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, 3))
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
-}
-
-/// Sets a start value of a parameter that the document has, within its bounds.
-pub fn set(values: &mut Values, document: &Simulation, name: &str, x: f64) {
-    if let Some(p) = document.parameter(name) {
-        values.parameters.insert(name.to_owned(), x.clamp(p.lower(), p.upper()));
-    }
-}
-
-/// The parent's values with each of the candidate's starts; the last one has the simulation's parameters as the user gave them where the
-/// parent has no effect yet, and the one before it comes from a global calibration where the parent is far off and the law has no amplitude.
-fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
-    let document = &candidate.refit.simulation;
-    let values =
-        with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
-    let with = |values: &Values, start: Vec<(String, f64)>| {
-        let mut from = values.clone();
-        start.iter().for_each(|(name, x)| set(&mut from, document, name, *x));
-        from
-    };
-    let starts = starts(candidate);
-    let mut out: Vec<Values> = starts.iter().map(|s| with(&values, s.clone())).collect();
-    if parent.effects.is_empty()
-        && let Some(best) = starts.into_iter().next()
-    {
-        let mut own = values.clone();
-        for p in setting.original.parameters.iter().filter(|p| !p.fixed) {
-            own.parameters.insert(p.name.clone(), p.value);
-        }
-        let own = with(&own, best);
-        // A law with amplitudes begins beside the simulation as it is; one without them is there or not, and may stand far from it.
-        if candidate.refit.amplitudes.is_empty() && parent.base.far() && !setting.budget.omits(Step::Fits) {
-            let mut document = document.clone();
-            for p in &mut document.parameters {
-                p.value = own.parameters.get(&p.name).copied().unwrap_or(p.value);
-            }
-            let restored = calibrated_unfolded(&setting.original, &document, setting.data);
-            if let Some(found) = restored.or_else(|| calibrated_copy(&document, setting.data, 1).map(|c| c.0)) {
-                let mut global = own.clone();
-                global.parameters.extend(found.parameters.iter().map(|p| (p.name.clone(), p.value)));
-                out.push(global);
-            }
-        }
-        out.push(own);
-    }
-    out
 }
 
 /// Refits one candidate on top of a hypothesis' simulation.
@@ -182,23 +94,6 @@ fn refit_from<'d>(
     Some(finer(setting, parent, &h, parent.effects.len()).unwrap_or(h))
 }
 
-/// The end of a fit: shapes that least squares cannot move, of the effects from `from` on, then a round under the hypothesis' own noise.
-pub fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
-    for index in from..h.effects.len() {
-        profile_shapes(setting, h, index);
-    }
-    if setting.budget.omits(Step::Fits) {
-        return;
-    }
-    let polished = setting.further(&h.base, Some(&h.base.whitener), 1, setting.iterations);
-    if let Some(p) = polished
-        && p.log_likelihood > h.base.log_likelihood
-    {
-        h.base = p;
-    }
-    h.log_evidence = setting.evidence(&h.base);
-}
-
 /// A fitted candidate as a hypothesis.
 fn hypothesis<'d>(
     setting: &Setting<'d>,
@@ -214,68 +109,6 @@ fn hypothesis<'d>(
         concealment: candidate.concealment(),
     });
     setting.hypothesis(effects, base)
-}
-
-/// Line search over shapes that least squares cannot move: where the derivative by the shape vanishes or the shape stands where it began,
-/// its neighbourhood in the grid is searched by shrinking steps, the other unknowns refitted at each.
-fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usize) {
-    let whole = h.base.model.simulation().clone();
-    let effect = h.effects[index].clone();
-    for shape in &effect.written.shapes {
-        if !shape.searched || shape.grid.len() < 3 {
-            continue;
-        }
-        let mut document = whole.clone();
-        let Some(p) = document.parameter_mut(&shape.name) else { continue };
-        let (low, high) = (p.lower(), p.upper());
-        p.fixed = true;
-        let here = |b: &Base<'_>| b.values().parameters.get(&shape.name).copied().unwrap_or(0.0);
-        let spacing = shape.grid.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
-        let mut step = 0.5 * spacing;
-        let mut moved = false;
-        for _ in 0..6 {
-            if setting.budget.omits(Step::Fits) {
-                break;
-            }
-            let x = here(&h.base);
-            let trials: Vec<Option<Base<'d>>> = [x - step, x + step]
-                .into_par_iter()
-                .map(|value| {
-                    if value < low || value > high {
-                        return None;
-                    }
-                    let mut d = document.clone();
-                    if let Some(p) = d.parameter_mut(&shape.name) {
-                        p.value = value;
-                    }
-                    let mut from = h.base.values();
-                    from.parameters.insert(shape.name.clone(), value);
-                    setting.fit(&d, &from, Some(&h.base.whitener), 1, 3)
-                })
-                .collect();
-            let better = trials
-                .into_iter()
-                .flatten()
-                .filter(|t| t.log_likelihood > h.base.log_likelihood + 1e-3)
-                .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
-            match better {
-                Some(t) => (h.base, moved) = (t, true),
-                None => step *= 0.4,
-            }
-        }
-        if moved {
-            // Back to the document in which the shape is an unknown again.
-            for iterations in [2, 0] {
-                let values = h.base.values();
-                if let Some(b) = setting.fit(&whole, &values, Some(&h.base.whitener), 1, iterations)
-                    && (b.log_likelihood >= h.base.log_likelihood || iterations == 0)
-                {
-                    h.base = b;
-                    break;
-                }
-            }
-        }
-    }
 }
 
 /// Candidates of a list that are fitted to the end.

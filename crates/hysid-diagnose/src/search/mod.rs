@@ -5,6 +5,7 @@ pub mod budget;
 pub mod compose;
 pub mod explore;
 pub mod finer;
+pub mod finish;
 pub mod fitting;
 pub mod hypothesis;
 pub mod joint;
@@ -13,6 +14,7 @@ pub mod peaks;
 pub mod rehearsal;
 pub mod screen;
 pub mod second_look;
+pub mod starts;
 
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;

@@ -13,10 +13,10 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 use super::budget::Step;
-use super::fitting::set;
 use super::hypothesis::{Hypothesis, Setting};
 use super::screen::{Candidate, Point, with_added_starts};
 use super::second_look::lines_of;
+use super::starts::set;
 use crate::data::DataSet;
 use crate::evidence::{Projector, norm2, surprise};
 use crate::model::base::{Base, spared};

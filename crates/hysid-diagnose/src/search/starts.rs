@@ -1,0 +1,96 @@
+//! Where the fit of an effect begins: points of its grid, beside the parameters that the simulation has by then or that the user gave.
+
+use hysid_plant::Simulation;
+
+use super::budget::Step;
+use super::hypothesis::{Hypothesis, Setting};
+use super::screen::{Candidate, Point, with_added_starts};
+use crate::calibration::global::calibrated_copy;
+use crate::calibration::unfold::calibrated_unfolded;
+use crate::model::Values;
+
+/// Points of a shape grid that a refit starts from.
+const MOST_POINTS: usize = 3;
+
+/// Starts of a refit: the best points of the grid that are no neighbours of each other, and the gentlest.
+pub fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
+    let named = |point: &Point| -> Vec<(String, f64)> {
+        let mut values = point.shapes.clone();
+        for (name, amplitude) in &point.amplitudes {
+            values.push((name.clone(), *amplitude));
+        }
+        values
+    };
+    let mut out: Vec<Vec<(String, f64)>> = Vec::new();
+    let Some(best) = candidate.points.first() else { return out };
+    out.push(named(best));
+    let far = |a: &[(String, f64)], b: &[(String, f64)]| {
+        a.iter().zip(b).any(|((_, x), (_, y))| (x - y).abs() > 0.6 * x.abs().max(y.abs()))
+    };
+    let mut apart = vec![best];
+    for p in &candidate.points[1..] {
+        if apart.len() < MOST_POINTS && apart.iter().all(|q| far(&p.shapes, &q.shapes)) {
+            apart.push(p);
+            out.push(named(p));
+        }
+    }
+    if let [_, .., last] = candidate.refit.amplitudes.as_slice() {
+        // Beside another the last amplitude may have the wrong sign at zero, where friction that sticks is nothing like its derivative.
+        let mut turned = named(best);
+        turned.iter_mut().filter(|(name, _)| *name == last.name).for_each(|(_, value)| *value = -*value);
+        out.push(turned);
+    }
+    if candidate.refit.amplitudes.is_empty() && !candidate.refit.neutral.is_empty() {
+        // Only shapes: the effect's strength is in them, and the point's weight says how strong.
+        let weight = best.amplitudes.first().map_or(1.0, |a| a.1.clamp(0.05, 1.0));
+        let neutral = |name: &str| candidate.refit.neutral.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
+        out.push(best.shapes.iter().map(|(n, v)| (n.clone(), neutral(n) + weight.sqrt() * (v - neutral(n)))).collect());
+    }
+    out
+}
+
+/// Sets a start value of a parameter that the document has, within its bounds.
+pub fn set(values: &mut Values, document: &Simulation, name: &str, x: f64) {
+    if let Some(p) = document.parameter(name) {
+        values.parameters.insert(name.to_owned(), x.clamp(p.lower(), p.upper()));
+    }
+}
+
+/// The parent's values with each of the candidate's starts; the last one has the simulation's parameters as the user gave them where the
+/// parent has no effect yet, and the one before it comes from a global calibration where the parent is far off and the law has no amplitude.
+pub fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Vec<Values> {
+    let document = &candidate.refit.simulation;
+    let values =
+        with_added_starts(&parent.base.values(), &candidate.refit, &candidate.slot, setting.data.stretches.len());
+    let with = |values: &Values, start: Vec<(String, f64)>| {
+        let mut from = values.clone();
+        start.iter().for_each(|(name, x)| set(&mut from, document, name, *x));
+        from
+    };
+    let starts = starts(candidate);
+    let mut out: Vec<Values> = starts.iter().map(|s| with(&values, s.clone())).collect();
+    if parent.effects.is_empty()
+        && let Some(best) = starts.into_iter().next()
+    {
+        let mut own = values.clone();
+        for p in setting.original.parameters.iter().filter(|p| !p.fixed) {
+            own.parameters.insert(p.name.clone(), p.value);
+        }
+        let own = with(&own, best);
+        // A law with amplitudes begins beside the simulation as it is; one without them is there or not, and may stand far from it.
+        if candidate.refit.amplitudes.is_empty() && parent.base.far() && !setting.budget.omits(Step::Fits) {
+            let mut document = document.clone();
+            for p in &mut document.parameters {
+                p.value = own.parameters.get(&p.name).copied().unwrap_or(p.value);
+            }
+            let restored = calibrated_unfolded(&setting.original, &document, setting.data);
+            if let Some(found) = restored.or_else(|| calibrated_copy(&document, setting.data, 1).map(|c| c.0)) {
+                let mut global = own.clone();
+                global.parameters.extend(found.parameters.iter().map(|p| (p.name.clone(), p.value)));
+                out.push(global);
+            }
+        }
+        out.push(own);
+    }
+    out
+}
