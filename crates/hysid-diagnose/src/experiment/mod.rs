@@ -23,13 +23,11 @@ use crate::model::{Model, Values};
 use crate::refit::{LmOptions, levenberg_marquardt};
 use crate::search::budget::Step;
 use crate::search::hypothesis::{Hypothesis, Setting};
-use crate::verdict::weigh::{Contest, rivals_of, settled};
+use crate::verdict::weigh::{Contest, SETTLED, rivals_of, settled};
 use fresh::{answered, started};
 
 /// Below this two explanations cannot be told apart.
 pub const SAME: f64 = 9.0;
-/// From this on an experiment (or the recording itself) settles it.
-pub const SETTLED: f64 = 25.0;
 /// More is not better: a rival's own noise model takes part of its misfit for noise, so that four times what settles it is looked for.
 const AMPLE: f64 = 4.0 * SETTLED;
 /// Multiples of the recorded peak, in the order in which they are tried: the second row where the first has nothing ample.

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::{Claim, FIRM, Hypothesis as Weighed};
 use crate::evidence::norm2;
-use crate::experiment::SETTLED;
 use crate::model::base::Base;
 use crate::search::budget::Step;
 use crate::search::compose::best_of;
@@ -67,6 +66,9 @@ pub fn rivals_of(contest: &Contest<'_, '_>) -> Vec<usize> {
         rivals().max_by(|&a, &b| probability[a].total_cmp(&probability[b])).filter(|r| Some(*r) != by_evidence);
     by_evidence.into_iter().chain(likeliest).collect()
 }
+
+/// Squared distance of a rival's best imitation, in units of the noise, from which on an experiment (or the recording itself) settles it.
+pub const SETTLED: f64 = 25.0;
 
 /// Whether the recording has settled the matter between two sets: what it makes of them is far apart, and the odds are firm. What keeps such
 /// a verdict from being firm is something else, and no experiment between the two is needed.
