@@ -167,11 +167,6 @@ pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Cand
     })
 }
 
-/// The noise that the best model leaves, by output.
-pub fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {
-    best.base.whitener.models.iter().map(|m| m.innovation().min(m.noise_rms())).collect()
-}
-
 pub fn fits(
     simulation: &Simulation,
     held: &DataSet,

@@ -106,6 +106,10 @@ named! {
     }
 }
 
+/// Log evidence that a set of nothing but drifts and offsets must bring besides: noise that rises towards low frequency does what they do,
+/// process noise on a drive above all.
+pub(crate) const SLOW: f64 = 8.0;
+
 impl Family {
     /// Whether its members are sums of a few elements that imitate each other: which of them it is turns on how finely each law is
     /// written, and is never said firmly.

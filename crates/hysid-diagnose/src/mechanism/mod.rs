@@ -43,6 +43,7 @@ mod viscous_memory;
 use crate::slot::{Place, Slot, Structure};
 
 pub use excitation::Need;
+pub(crate) use family::SLOW;
 pub use family::{Block, Family};
 pub use law::{Change, Derived, Form, Grid, Law, LawParameter, LawState, Purpose, Role, Start};
 pub(crate) use law::{log_grid, log_steps};

@@ -1,15 +1,14 @@
 //! What is left of the winning set's residual: whether something significant is, whether generic terms find it, and whether the set is then only
 //! an imitation of a law that the catalogue does not have.
 
-use super::{OpenSet, fitted};
+use super::needed::fitted;
+use super::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet};
 use crate::answer::file::finite;
 use crate::answer::file::{CorrectionRecord, RemainingRecord};
-use crate::answer::records::noise_floor;
 use crate::evidence::SurrogateTest;
 use crate::search::Search;
 use crate::search::budget::Step;
 use crate::search::hypothesis::{Hypothesis, block_score};
-use crate::search::second_look::{ODDS_AGAINST, ODDS_AGAINST_MORE, unlikely};
 use crate::verdict::firmness::is_a_spectrum;
 use crate::verdict::weigh::better_by_chance;
 use crate::verdict::{FIRM, Support};
@@ -49,11 +48,11 @@ impl Left {
         let budget = search.setting.budget;
         let test = (winner > 0 && !budget.omits(Step::Remains)).then(|| search.remains(best));
         let open = if significant { search.open(best) } else { None };
-        let seen = open.as_ref().filter(|o| unlikely(o, ODDS_AGAINST_MORE) < alpha);
+        let seen = open.as_ref().filter(|o| o.by_chance(ODDS_AGAINST_MORE) < alpha);
         let explained = best.log_evidence - none.log_evidence;
         let spectrum = is_a_spectrum(best);
         let generic = if winner > 0 { search.open(none) } else { None };
-        let outdone = |o: &OpenSet| unlikely(o, ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
+        let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
         let outdone = generic.as_ref().is_some_and(outdone);
         let foreign = winner > 0 && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
         // What was not looked at is not known to be nothing.
@@ -69,7 +68,7 @@ impl Left {
     pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> Option<RemainingRecord> {
         let p = self.test.as_ref()?.p_value;
         Some(RemainingRecord {
-            p_value: p.min(self.open.as_ref().map_or(1.0, |o| unlikely(o, ODDS_AGAINST_MORE))),
+            p_value: p.min(self.open.as_ref().map_or(1.0, |o| o.by_chance(ODDS_AGAINST_MORE))),
             share: share(&pool[winner], &pool[0]),
         })
     }
@@ -126,7 +125,7 @@ impl Left {
 
     /// Whether a correction gains more evidence than noise has anywhere, and helps on blocks.
     fn stands_by_evidence(&self, open: &OpenSet) -> bool {
-        unlikely(open, ODDS_AGAINST) < self.alpha
+        open.by_chance(ODDS_AGAINST) < self.alpha
     }
 
     /// The correction, where it models something that is left and helps where it was not fitted, with what it says in words.
@@ -135,6 +134,11 @@ impl Left {
         let open = self.told().filter(|o| wanted && self.stands(o))?;
         Some((CorrectionRecord { ratio: finite(open.block_ratio), ..open.record.clone() }, open.words.clone()))
     }
+}
+
+/// The noise that the best model leaves, by output.
+fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {
+    best.base.whitener.models.iter().map(|m| m.innovation().min(m.noise_rms())).collect()
 }
 
 /// Share of the mismatch, above the noise, that a set leaves.

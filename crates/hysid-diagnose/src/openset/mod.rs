@@ -13,6 +13,7 @@ mod course;
 pub mod left;
 mod modulation;
 mod needed;
+mod regress;
 mod signature;
 mod terms;
 mod uneven;
@@ -25,9 +26,9 @@ use hysid_select::{Criterion, Options as Selecting, select};
 
 use crate::answer::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::data::held_out_blocks;
-use crate::evidence::{Projector, Whitener, dot, norm2};
+use crate::evidence::{Projector, Whitener, norm2};
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
-pub use needed::fitted;
+use regress::regress;
 use signature::signature;
 use terms::{Kind, Term, terms};
 pub use uneven::uneven;
@@ -48,6 +49,19 @@ pub struct OpenSet {
     pub writable: Option<Writable>,
     /// What it says in words, where it says more than that something is missing.
     pub words: Option<String>,
+}
+
+/// Odds against a mismatch before the recording is looked at. The noise model is an estimate: on recordings in which nothing is missing the best
+/// of the sets gains more than chance alone would give it, and the odds must allow for that.
+pub const ODDS_AGAINST: f64 = 1000.0;
+/// Odds against something more where a mismatch is known.
+pub const ODDS_AGAINST_MORE: f64 = 10.0;
+
+impl OpenSet {
+    /// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
+    pub fn by_chance(&self, odds_against: f64) -> f64 {
+        if self.block_ratio < 1.0 { (odds_against * (-self.gain).exp()).min(1.0) } else { 1.0 }
+    }
 }
 
 /// A correction that can be written into a simulation.
@@ -201,43 +215,4 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
     let price = kind.price(base.model.unknowns().len(), chosen.len(), after.len()) + among;
     let err = selection.steps.iter().map(|s| s.err).collect();
     Some(Chosen { terms: chosen, err, coefficients, left, gain: likelihood - base.log_likelihood - price })
-}
-
-/// Least squares of the residual on these columns beside the simulation's own tangents, with these weights of the whitened rows: the columns'
-/// coefficients, and what is left. Columns' coefficients have this precision beforehand, in units of the whitened rows.
-fn regress(
-    base: &Base<'_>,
-    columns: &[&[f64]],
-    noise: &Whitener,
-    weights: Option<&[f64]>,
-    precision: f64,
-) -> (Vec<f64>, Vec<f64>) {
-    let layout = &base.model.data().layout;
-    let own = base.fit.jacobian.len();
-    let all: Vec<&[f64]> = base.fit.jacobian.iter().map(Vec::as_slice).chain(columns.iter().copied()).collect();
-    let weigh = |mut x: Vec<f64>| {
-        if let Some(w) = weights {
-            x.iter_mut().zip(w).for_each(|(x, w)| *x *= w);
-        }
-        x
-    };
-    let white: Vec<Vec<f64>> = all.iter().map(|c| weigh(noise.apply(layout, c))).collect();
-    let norms: Vec<f64> = white.iter().map(|c| norm2(c).sqrt().max(f64::MIN_POSITIVE)).collect();
-    let r = weigh(noise.apply(layout, &base.fit.residual));
-    let k = all.len();
-    // A little ridge, for tangents that are combinations of others.
-    let known = |a: usize| if a < own { 0.0 } else { precision / (norms[a] * norms[a]) };
-    let gram = nalgebra::DMatrix::from_fn(k, k, |a, b| {
-        dot(&white[a], &white[b]) / (norms[a] * norms[b]) + if a == b { 1e-9 + known(a) } else { 0.0 }
-    });
-    let rhs = nalgebra::DVector::from_fn(k, |a, _| dot(&white[a], &r) / norms[a]);
-    let solution: Vec<f64> = match gram.cholesky() {
-        Some(c) => c.solve(&rhs).iter().zip(&norms).map(|(x, n)| x / n).collect(),
-        None => vec![0.0; k],
-    };
-    let mut after = base.fit.residual.clone();
-    for (c, x) in all.iter().zip(&solution) {
-        after.iter_mut().zip(*c).for_each(|(a, c)| *a -= x * c);
-    }
-    (solution[own..].to_vec(), after)
 }

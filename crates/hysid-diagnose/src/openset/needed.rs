@@ -5,7 +5,8 @@
 
 use hysid_plant::Simulation;
 
-use super::{Sparse, Writable};
+use super::Writable;
+use super::written::Sparse;
 use crate::model::base::Base;
 use crate::search::budget::Step;
 use crate::search::hypothesis::{Hypothesis, Setting};

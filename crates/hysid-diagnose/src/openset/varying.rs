@@ -11,12 +11,12 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::course::{COURSES, Course, Series, Time};
 use super::modulation::{Modulated, modulated};
-use super::regress;
+use super::regress::regress;
 use crate::answer::text::number;
 use crate::evidence::{Layout, Projector, Wander, Whitener, dot, lines, norm2, score};
+use crate::mechanism::SLOW;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use crate::random::generator;
-use crate::search::second_look::SLOW;
 
 /// Lines of each parameter whose responses are taken, and of these how many are judged with a noise model of their own.
 const LINES: (usize, usize) = (4, 2);

@@ -23,9 +23,9 @@ use rayon::prelude::*;
 
 use crate::error::DiagnoseError;
 use crate::evidence::{Contender, Projector, SurrogateTest, TestOptions, surrogate_test};
-use crate::mechanism::{Family, Mechanism};
+use crate::mechanism::{Family, Mechanism, SLOW};
 use crate::model::base::{Base, NoiseKind};
-use crate::openset::{OpenSet, correction};
+use crate::openset::{ODDS_AGAINST_MORE, OpenSet, correction};
 use crate::request::{Hooks, Options, Question};
 use crate::slot::Slot;
 use budget::Step;
@@ -33,7 +33,6 @@ use compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short
 use fitting::{refit, refit_all, refit_wider};
 use hypothesis::{Hypothesis, Key, Setting};
 use screen::{Candidate, screen};
-use second_look::{ODDS_AGAINST_MORE, SLOW, unlikely};
 
 /// Composition goes on while the mismatch that remains is significant at this level.
 const STOP_LEVEL: f64 = 0.02;
@@ -156,7 +155,7 @@ impl<'a, 'd> Search<'a, 'd> {
         let unexplained = |h: &Hypothesis<'_>| {
             let test = self.remains(h);
             let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured();
-            seen || self.open(h).is_some_and(|o| unlikely(&o, ODDS_AGAINST_MORE) < self.options.alpha)
+            seen || self.open(h).is_some_and(|o| o.by_chance(ODDS_AGAINST_MORE) < self.options.alpha)
         };
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
         let around = |h: &Hypothesis<'d>| self.around(h);

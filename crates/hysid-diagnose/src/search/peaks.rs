@@ -1,5 +1,7 @@
 //! Lines of the residual's spectrum: where a force that follows the clock is looked for.
 
+use crate::data::DataSet;
+use crate::mechanism::{Places, Rewritten, Shape};
 use crate::model::base::Base;
 
 /// Lines that are looked at.
@@ -66,6 +68,12 @@ fn cycle(y: &[f64]) -> Option<f64> {
     let lag = (unlike..most).find(|&lag| r[lag] > REPEATS && r[lag] >= r[lag - 1] && r[lag] > r[lag + 1])?;
     let (a, b, c) = (r[lag - 1], r[lag], r[lag + 1]);
     Some(lag as f64 + 0.5 * (a - c) / (a - 2.0 * b + c))
+}
+
+/// Lines of a recording's spectrum among which the residual itself pointed to one, for each of an effect's shapes that is such a line.
+pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
+    let lines = |shape: &Shape| if shape.places == Places::Lines { (0.5 * data.rows() as f64).max(1.0) } else { 1.0 };
+    effect.shapes.iter().map(lines).product()
 }
 
 #[cfg(test)]

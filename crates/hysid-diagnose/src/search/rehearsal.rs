@@ -14,8 +14,8 @@ use rayon::prelude::*;
 
 use super::budget::Step;
 use super::hypothesis::{Hypothesis, Setting};
+use super::peaks::lines_of;
 use super::screen::{Candidate, Point, with_added_starts};
-use super::second_look::lines_of;
 use super::starts::set;
 use crate::data::DataSet;
 use crate::evidence::{Projector, norm2, surprise};

@@ -8,13 +8,13 @@ use super::Search;
 use super::compose::{short_list, superposed};
 use super::fitting::refit_all;
 use super::hypothesis::{Effect, Hypothesis, block_score};
+use super::peaks::lines_of;
 use super::rehearsal::by_rehearsal;
 use super::screen::Candidate;
-use crate::data::DataSet;
 use crate::evidence::NoiseModel;
-use crate::mechanism::{Places, Rewritten, Shape};
+use crate::mechanism::{Places, SLOW};
 use crate::model::base::spared;
-use crate::openset::OpenSet;
+use crate::openset::ODDS_AGAINST;
 use crate::verdict::weigh::better_by_chance;
 
 /// Effects and pairs that are fitted for a second look.
@@ -25,31 +25,12 @@ const LARGE: f64 = 0.25;
 const SURE: f64 = 15.0;
 /// Share of the squared error on held-out blocks that noise never takes away.
 const HALF: f64 = 0.5;
-/// Odds against a mismatch before the recording is looked at. The noise model is an estimate: on recordings in which nothing is missing the best
-/// of the sets gains more than chance alone would give it, and the odds must allow for that.
-pub const ODDS_AGAINST: f64 = 1000.0;
-/// Odds against something more where a mismatch is known.
-pub const ODDS_AGAINST_MORE: f64 = 10.0;
 /// Moments of a recording that are apart for an effect that begins at one of them.
 const MOMENTS: f64 = 25.0;
-/// Log evidence that a set of nothing but drifts and offsets must bring besides: noise that rises towards low frequency does what they do,
-/// process noise on a drive above all.
-pub const SLOW: f64 = 8.0;
 
 /// Share of the level that each test of a second look has: sets, rehearsals and generic terms are three tests that a recording must pass in which
 /// nothing is missing, beside the surrogates.
 const OF_THREE: f64 = 1.0 / 3.0;
-
-/// Lines of a recording's spectrum among which the residual itself pointed to one, for each of an effect's shapes that is such a line.
-pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
-    let lines = |shape: &Shape| if shape.places == Places::Lines { (0.5 * data.rows() as f64).max(1.0) } else { 1.0 };
-    effect.shapes.iter().map(lines).product()
-}
-
-/// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
-pub fn unlikely(open: &OpenSet, odds_against: f64) -> f64 {
-    if open.block_ratio < 1.0 { (odds_against * (-open.gain).exp()).min(1.0) } else { 1.0 }
-}
 
 impl<'d> Search<'_, 'd> {
     /// The likeliest effects and pairs, fitted; and what is there or not (a sensor that shows the size only), of which no derivative at
@@ -102,7 +83,7 @@ impl<'d> Search<'_, 'd> {
 
     /// A bound for the probability that generic terms gain so much where nothing is missing, below the level.
     pub fn by_terms(&self, start: &Hypothesis<'d>) -> Option<f64> {
-        self.open(start).map(|o| unlikely(&o, ODDS_AGAINST)).filter(|p| *p < self.level())
+        self.open(start).map(|o| o.by_chance(ODDS_AGAINST)).filter(|p| *p < self.level())
     }
 
     /// Whether a set predicts blocks that it was not fitted to better than the simulation as it is.
