@@ -211,10 +211,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let varying = varying.flatten();
     file.notes.extend(varying.iter().map(|words| format!("what is left looks like something that varies: {words}")));
 
-    let unequal: Vec<String> = best.effects.iter().zip(&uneven).filter_map(|(e, u)| u.as_ref()?.words(e)).collect();
-    file.notes.extend(unequal.iter().map(|words| format!("{words}: the catalogue has no such law")));
-
     recalibrate(&mut file);
+    let unequal: Vec<String> = (best.effects.iter().zip(&uneven).zip(&file.effects))
+        .filter_map(|((e, u), told)| u.as_ref()?.beside(told.support, told.probability).words(e))
+        .collect();
+    file.notes.extend(unequal.iter().map(|words| format!("{words}: the catalogue has no such law")));
 
     (hooks.progress)("scoring on the hold-out");
     let augmented = written.map(|h| h.base.document());

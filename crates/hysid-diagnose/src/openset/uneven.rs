@@ -41,6 +41,13 @@ const CERTAIN: f64 = 300.0;
 const WORTH_SAYING: f64 = 0.05;
 
 impl Uneven {
+    /// The same where an effect of such a support, from which this was taken already, is told with another probability: the dependence keeps its share of
+    /// what the effect leaves, so that the two never sum to more than one.
+    pub fn beside(self, support: f64, probability: f64) -> Self {
+        let share = (1.0 - probability) / (1.0 - support).max(f64::MIN_POSITIVE);
+        Self { probability: (self.probability * share).min(1.0), ..self }
+    }
+
     /// In words, of an effect; `None` where it is too unlikely to be said.
     pub fn words(&self, e: &Effect) -> Option<String> {
         (self.probability >= WORTH_SAYING).then(|| {
@@ -160,6 +167,21 @@ mod tests {
         }
         let humped = found(9, |x| 1.0 + 0.5 * x * x, 0.02);
         assert!(humped.probability > 0.99 && humped.on == "the square of the position", "{humped:?}");
+    }
+
+    #[test]
+    fn an_effect_and_the_dependence_of_its_strength_sum_to_one_at_most() {
+        for dependence in [0.0, 0.03, 0.4, 0.97, 1.0] {
+            for own in [0.0, 0.2, 0.9, 1.0] {
+                let support = own * (1.0 - dependence);
+                for told in [0.0, 0.1, support, 0.89, 1.0] {
+                    let beside = Uneven { probability: dependence, on: "the speed" }.beside(support, told);
+                    assert!(told + beside.probability <= 1.0 + 1e-12, "{dependence} {own} {told}: {beside:?}");
+                }
+            }
+        }
+        let kept = Uneven { probability: 0.1, on: "the speed" }.beside(0.6, 0.6);
+        assert!((kept.probability - 0.1).abs() < 1e-15, "a support that is not mapped leaves it as it was");
     }
 
     #[test]
