@@ -6,7 +6,9 @@
 //! left to [`parse`], which judges it.
 
 use crate::error::InputProblem;
-use crate::read::LARGEST_VALUE;
+
+/// The largest magnitude that a sample may have: squares and products of a few samples must stay finite.
+pub const LARGEST_VALUE: f64 = 1e100;
 
 /// A number at the beginning of some text.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,9 +8,6 @@ use crate::chunks::CsvChunks;
 use crate::clock::fit_clock;
 use crate::error::{InputError, InputProblem};
 
-/// The largest magnitude that a sample may have: squares and products of a few samples must stay finite.
-pub const LARGEST_VALUE: f64 = 1e100;
-
 /// Where the sampling period comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TimeSource {

@@ -14,7 +14,9 @@ use hysid_linalg::{
 
 use crate::Criterion;
 use crate::criterion::{Facts, value};
-use crate::search::EXACT;
+
+/// What inner products in double precision cannot tell from nothing, relative to y'y.
+pub(crate) const EXACT: f64 = 1e-14;
 
 /// What the samples say of a path of columns; entry k - 1 is for the first k columns.
 #[derive(Debug, Clone)]

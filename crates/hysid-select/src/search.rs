@@ -8,14 +8,12 @@ use crate::forward::Factor;
 use crate::moments::Moments;
 use crate::options::longest;
 use crate::pursuit::Pursuit;
-use crate::refit::{Goal, Refit};
+use crate::refit::{EXACT, Goal, Refit};
 use crate::rescore::{Choice, choose_next};
 use crate::{Criterion, Options, Rejected, RejectedReason, Search, StopReason};
 
 /// A subset must leave less than this part of the old one's residual to count as better; below [`EXACT`] nothing is better.
 const BETTER: f64 = 1.0 - 1e-9;
-/// What inner products in double precision cannot tell from nothing, relative to y'y.
-pub(crate) const EXACT: f64 = 1e-14;
 
 /// The best subset for each number of terms (place k - 1 for k terms).
 #[derive(Default)]

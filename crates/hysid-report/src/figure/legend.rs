@@ -8,7 +8,19 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::FigureError;
-use super::plot::Mark;
+
+/// How a layer's points are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// Joined by a line.
+    Line,
+    /// Joined by a dashed line.
+    Dashed,
+    /// A dot each.
+    Dots,
+    /// A vertical line from zero each, as in a correlogram.
+    Stems,
+}
 
 /// What stands beside a label.
 #[derive(Debug, Clone, Copy)]

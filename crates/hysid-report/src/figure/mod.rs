@@ -5,8 +5,9 @@ mod map;
 mod plot;
 mod thin;
 
+pub use legend::Mark;
 pub use map::{Map, Scale};
-pub use plot::{Band, Layer, LogAxes, Mark, Plot, Tone};
+pub use plot::{Band, Layer, LogAxes, Plot, Tone};
 pub use thin::envelope;
 
 /// Why a figure could not be drawn: the drawing library's words.

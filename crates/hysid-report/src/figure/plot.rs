@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::FigureError;
-use super::legend::{Legend, Sample};
+use super::legend::{Legend, Mark, Sample};
 use crate::words::number;
 
 /// Pixels around the axes, to their right, and for the vertical axis's labels.
@@ -37,19 +37,6 @@ impl Tone {
             Self::Faint => RGBColor(150, 154, 160),
         }
     }
-}
-
-/// How a layer's points are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
-    /// Joined by a line.
-    Line,
-    /// Joined by a dashed line.
-    Dashed,
-    /// A dot each.
-    Dots,
-    /// A vertical line from zero each, as in a correlogram.
-    Stems,
 }
 
 /// One series of a plot.
