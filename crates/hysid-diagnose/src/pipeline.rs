@@ -126,6 +126,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     for (s, u) in support.iter_mut().zip(&uneven) {
         s.discount(u.map_or(0.0, |u| u.probability));
     }
+    // On four turns a play and a sum of plays are one law: what a law needs to be told from its neighbours it needs to be told firmly.
+    let lacking = lacking(&pool[winner], &candidates);
+    support.iter_mut().zip(&lacking).filter(|(_, l)| l.is_some()).for_each(|(s, _)| s.weaken());
     // A search that was cut short has not heard all rivals.
     if budget.unfinished() {
         support.iter_mut().for_each(Support::weaken);
@@ -224,7 +227,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
-    file.notes.extend(lacking(best, &candidates));
+    file.notes.extend(lacking.into_iter().flatten());
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
     if let Some(note) = budget.note() {

@@ -82,14 +82,14 @@ pub fn from_moment(effects: &[EffectRecord], data: &DataSet) -> Option<[f64; 2]>
     Some([moment.value, last.start_s + last.len() as f64 * data.period_s])
 }
 
-/// What the recording lacks for a firmer answer about the effects of the best set.
-pub fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<String> {
+/// What the recording lacks for a firm answer about each effect of the best set; `None` where nothing is lacking.
+pub fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String>> {
     let told = |e: &Effect| {
         let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?;
         let lacking = candidate.lacking.as_ref()?;
-        Some(format!("{}: for a firmer answer the recording lacks something: {lacking}", e.mechanism.id))
+        Some(format!("{}: for a firm answer the recording lacks something: {lacking}", e.mechanism.id))
     };
-    best.effects.iter().filter_map(told).collect()
+    best.effects.iter().map(told).collect()
 }
 
 /// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it.
