@@ -31,9 +31,20 @@ struct Loop<'a> {
 }
 
 /// What a sum of plays makes of the input, in um, with noise of this size in um.
-fn recording(name: &str, seed: u64, Loop { plays, widening }: Loop<'_>, noise: f64) -> Recording {
+fn recording(name: &str, seed: u64, plays: Loop<'_>, noise: f64) -> Recording {
     let mut random = normal(seed);
     let u = drive(1200, &mut random);
+    answer(name, u, plays, noise, random)
+}
+
+/// The same of any input, in V; `random` gives the noise.
+fn answer(
+    name: &str,
+    u: Vec<f64>,
+    Loop { plays, widening }: Loop<'_>,
+    noise: f64,
+    mut random: impl FnMut() -> f64,
+) -> Recording {
     // At rest before: each play in the middle of its band.
     let (mut held, mut before) = (vec![u[0]; plays.len()], u[0]);
     let y = u.iter().map(|&u| {
@@ -52,13 +63,17 @@ fn recording(name: &str, seed: u64, Loop { plays, widening }: Loop<'_>, noise: f
 }
 
 fn diagnosed(plays: Loop<'_>, noise: f64) -> Diagnosis {
+    of_recordings(recording("est.csv", 1, plays, noise), recording("val.csv", 2, plays, noise))
+}
+
+fn of_recordings(estimation: Recording, holdout: Recording) -> Diagnosis {
     let simulation = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
     let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
     let request = Request {
         simulation: &simulation,
         file: "test.sim.toml",
-        estimation: &[recording("est.csv", 1, plays, noise)],
-        holdout: &[recording("val.csv", 2, plays, noise)],
+        estimation: &[estimation],
+        holdout: &[holdout],
         questions: &[],
         options: Options::default(),
     };
@@ -119,4 +134,30 @@ fn a_loop_that_widens_with_the_rate_of_a_rough_input_is_followed() {
     assert_eq!(d.file.effects[0].mechanism, "rate_dependent_hysteresis", "{}", d.file.summary);
     let growth = value(parameters, "lambda") / PERIOD;
     assert!((growth / 0.25).ln().abs() < 0.1, "{growth} 1/V: {parameters:?}");
+}
+
+#[test]
+fn backlash_is_firm_only_where_the_input_turns_often_enough() {
+    // Straight lines up and down, each somewhat shorter than the one before.
+    let zigzag = |lines: usize| -> Vec<f64> {
+        let corner = |k: usize| 30.0 * (1.0 - 0.4 * k as f64 / lines as f64) * if k % 2 == 0 { -1.0 } else { 1.0 };
+        let at = |i: usize| {
+            let place = i as f64 * lines as f64 / 1200.0;
+            let (k, part) = (place.floor() as usize, place.fract());
+            corner(k) * (1.0 - part) + corner(k + 1) * part
+        };
+        (0..1200).map(at).collect()
+    };
+    let noise = 0.005;
+    let play = Loop { plays: &[(1.0, 1.5)], widening: 0.0 };
+    for (lines, often) in [(4, false), (16, true)] {
+        let of = |name, seed| answer(name, zigzag(lines), play, noise, normal(seed));
+        let file = of_recordings(of("est.csv", 1), of("val.csv", 2)).file;
+        let [effect] = file.effects.as_slice() else { panic!("{lines}: {}", file.summary) };
+        assert_eq!(effect.mechanism, "backlash", "{lines}: {}", file.summary);
+        assert_eq!(effect.probability >= 0.9, often, "{lines}: {}", file.summary);
+        assert_eq!(effect.family_probability >= 0.9, often, "{lines}: {}", file.summary);
+        let told = file.notes.iter().any(|n| n.starts_with("backlash: for a firm answer the recording lacks"));
+        assert_eq!(told, !often, "{lines}: {:?}", file.notes);
+    }
 }
