@@ -12,6 +12,7 @@ use crate::data::intake::{Intake, intake};
 use crate::error::DiagnoseError;
 use crate::experiment::fresh::gamble;
 use crate::experiment::separating;
+use crate::model::Count;
 use crate::model::base::NoiseKind;
 use crate::model::force::pushed;
 use crate::model::hold::free_run;
@@ -65,22 +66,20 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let Intake { data, held, notes } = intake(request, hooks)?;
 
     (hooks.progress)("calibrating the simulation");
-    let own_states: Vec<String> = simulation.states.iter().map(|s| s.name.clone()).collect();
     let budget = Budget::new(hooks.expired);
     let mut setting = Setting {
         data: &data,
         original: simulation.clone(),
-        own_states,
         pushed: pushed(simulation),
         substeps: 2,
-        own_unknowns: 0,
+        own_unknowns: Count::default(),
         iterations: 12,
         noise: NoiseKind::Coloured,
         budget: &budget,
     };
     let base = calibrate(&mut setting, request)?;
     (hooks.accepted)();
-    setting.own_unknowns = base.model.unknowns().len();
+    setting.own_unknowns = base.model.count();
     let found = explore(&setting, base, request, hooks, LESSONS)?;
     let Explored { search, pool, candidates, significant, p_value, residual, detectable, least, notes: heard } = found;
     let (search, setting) = (&search, &search.setting);
@@ -114,7 +113,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
     let blocks = block_scores(setting, &pool);
     let winner = if significant { tie_broken(&pool, &blocks) } else { 0 };
-    let left = Left::of(search, &pool, winner, significant);
+    let mut left = Left::of(search, &pool, winner, significant);
     let probability = likelihoods(&pool, &weighed, &blocks, winner, left.imperfect);
     let mut support = firmness(&pool, &weighed, &probability, winner, left.imperfect);
     // Where something is left, or rivals were not heard, nothing is firm anyway, and what is missing looks like a strength that varies.
@@ -222,8 +221,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("scoring on the hold-out");
     let augmented = written.map(|h| h.base.document());
-    let before = free_run(&baseline, &held, &setting.own_states, setting.substeps);
-    let after = augmented.as_ref().and_then(|a| free_run(a, &held, &setting.own_states, setting.substeps));
+    let before = free_run(&baseline, &held, setting.substeps);
+    let after = augmented.as_ref().and_then(|a| free_run(a, &held, setting.substeps));
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));

@@ -16,7 +16,7 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
     let simulation = request.simulation;
     let bad =
         |e: hysid_plant::Error| DiagnoseError::Simulation { file: request.file.to_owned(), problem: e.to_string() };
-    let model = Model::new(simulation, setting.data, &setting.own_states, setting.substeps).map_err(bad)?;
+    let model = Model::new(simulation, setting.data, setting.substeps).map_err(bad)?;
     let start = model.theta(&Values::default());
     let diverged = model.simulate(&start).1;
     let mut best: Option<Base<'d>> = None;

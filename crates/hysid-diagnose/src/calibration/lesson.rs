@@ -130,7 +130,7 @@ fn enough(setting: &Setting<'_>, h: &Hypothesis<'_>) -> usize {
     let now = h.base.model.substeps();
     let values = h.base.values();
     let predicted = |substeps: usize| {
-        let m = Model::new(h.base.model.simulation(), setting.data, &setting.own_states, substeps).ok()?;
+        let m = Model::new(h.base.model.simulation(), setting.data, substeps).ok()?;
         m.predict(&m.theta(&values))
     };
     let Some(exact) = predicted(2 * MOST_SUBSTEPS) else { return now };

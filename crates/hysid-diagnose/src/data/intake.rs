@@ -6,9 +6,9 @@ use super::{DataSet, held_out_blocks};
 use crate::error::DiagnoseError;
 use crate::request::{Hooks, Request};
 
-/// Most samples that the search works on where the outputs are thinned, and where they are not; a longer recording is used in windows.
+/// Most samples that the search works on; a longer recording is used in windows. What a simulation remembers at the start of a window is unknown, so
+/// that only a recording that no search can afford is cut.
 const MOST_SAMPLES: usize = 26_000;
-const MOST_ROWS: usize = 12_000;
 
 /// What a diagnosis works on.
 pub struct Intake {
@@ -54,7 +54,7 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
     if request.holdout.is_empty() {
         notes.push("no hold-out recording was given: blocks of the recordings were held out and score the fit".into());
     }
-    let data = full.within(if full.own_step() > 1 { MOST_SAMPLES } else { MOST_ROWS }).thinned();
+    let data = full.within(MOST_SAMPLES).thinned();
     notes.extend(data.notes.iter().filter(|n| !full.notes.contains(n)).cloned());
     Ok(Intake { data, held, notes })
 }

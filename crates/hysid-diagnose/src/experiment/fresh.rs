@@ -38,7 +38,7 @@ pub fn answered(document: &Simulation, drive: &Drive, substeps: usize) -> Option
     let empty = DataSet::of_drive(drive.clone(), silent, drive.period_s());
     let mut fixed = document.clone();
     fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
-    let model = Model::new(&fixed, &empty, &[], substeps).ok()?;
+    let model = Model::new(&fixed, &empty, substeps).ok()?;
     let y = model.predict(&model.theta(&Values::default()))?;
     Some(empty.with_outputs(y))
 }

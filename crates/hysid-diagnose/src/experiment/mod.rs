@@ -40,15 +40,8 @@ const ITERATIONS: usize = 5;
 const LONGEST: usize = 2000;
 
 /// Squared distance of a rival's best imitation from `truth`, in units of the noise.
-fn distance(
-    document: &Simulation,
-    values: &Values,
-    data: &DataSet,
-    own_states: &[String],
-    substeps: usize,
-    noise: &Whitener,
-) -> Option<f64> {
-    let model = Model::new(document, data, own_states, substeps).ok()?;
+fn distance(document: &Simulation, values: &Values, data: &DataSet, substeps: usize, noise: &Whitener) -> Option<f64> {
+    let model = Model::new(document, data, substeps).ok()?;
     let start = model.theta(values);
     let fit = levenberg_marquardt(
         &model,
@@ -65,14 +58,7 @@ fn distance(
 fn present_separation(setting: &Setting<'_>, winner: &Hypothesis<'_>, rival: &Hypothesis<'_>) -> Option<f64> {
     let truth = winner.base.model.predict(&winner.base.fit.theta)?;
     let data = setting.data.with_outputs(truth);
-    distance(
-        rival.base.model.simulation(),
-        &rival.base.values(),
-        &data,
-        &setting.own_states,
-        setting.substeps,
-        &winner.base.whitener,
-    )
+    distance(rival.base.model.simulation(), &rival.base.values(), &data, setting.substeps, &winner.base.whitener)
 }
 
 /// The shape that stands for the recorded inputs themselves, scaled.
@@ -168,7 +154,7 @@ fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) 
     let substeps = if trial.level > 1.0 { 2 * setting.substeps } else { setting.substeps };
     let one = |truth: &Simulation, noise: &Whitener, rival: &Simulation, rival_values: &Values| -> Option<f64> {
         let data = answered(truth, &trial.drive, substeps)?;
-        distance(rival, rival_values, &data, &[], substeps, noise)
+        distance(rival, rival_values, &data, substeps, noise)
     };
     let forth = one(&da, &a.whitener, &db, &b.values())?;
     let back = one(&db, &b.whitener, &da, &a.values())?;

@@ -82,7 +82,7 @@ mod tests {
         let u: Vec<f64> = (0..n).map(|i| 2.0 * (0.11 * i as f64).sin() + (0.017 * (i * i) as f64).cos()).collect();
         let drive = Drive::new(0.0, 0.05, n, vec![u, vec![0.0; n]]).unwrap();
         let data = DataSet::of_drive(drive, vec![vec![0.0; n]; 2], 0.05);
-        let model = Model::new(&simulation, &data, &["x".into(), "v".into()], 4).unwrap();
+        let model = Model::new(&simulation, &data, 4).unwrap();
         let theta = model.theta(&Values::default());
         let v: Vec<f64> = (0..2 * n).map(|i| (0.3 * i as f64).cos() + (1.7 * i as f64).sin()).collect();
         let score = model.by_inputs(&theta, &[vec![0.0; 2 * n], v.clone()]).unwrap().pop().unwrap();

@@ -3,7 +3,7 @@
 use hysid_plant::Simulation;
 
 use super::force::force_paths;
-use super::{Model, Values};
+use super::{Count, Model, Values};
 use crate::data::DataSet;
 use crate::evidence::{ForcePath, NoiseModel, Projector, Whitener, norm2};
 use crate::refit::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};
@@ -30,18 +30,19 @@ impl NoiseKind {
         }
     }
 
-    /// What `further` unknowns cost in log evidence beside `own` ones in a recording of so many rows: half of `ln n` each.
+    /// What `further` unknowns cost in log evidence beside `own` lasting ones in a recording of so many rows: half of `ln n` each; those that
+    /// pass cost what a parameter takes of the noise and of a prediction (Akaike), since the recording's length says no more of them.
     ///
     /// Where rows are no independent witnesses, few are left, and half of `ln n` for each unknown is too little: the more unknowns there are
     /// beside few witnesses, the more each explains by chance. The price is then that of the Bayes criterion corrected for small samples
     /// (A. D. R. McQuarrie, C.-L. Tsai, Regression and Time Series Model Selection, World Scientific (1998), BICc).
-    pub fn price(self, own: usize, further: usize, rows: usize) -> f64 {
+    pub fn price(self, own: usize, further: Count, rows: usize) -> f64 {
         let rows = (self.share() * rows as f64).max(2.0);
         let all = |unknowns: usize| match self {
             Self::Coloured => 0.5 * unknowns as f64 * rows.ln(),
             Self::White(_) => corrected_price(unknowns as f64, rows),
         };
-        all(own + further) - all(own)
+        all(own + further.lasting) - all(own) + further.passing as f64
     }
 }
 
@@ -228,8 +229,9 @@ mod tests {
 
     #[test]
     fn rows_count_for_their_share_of_a_witness() {
-        let (rows, few) = (NoiseKind::White(1.0).price(4, 3, 25), NoiseKind::White(0.01).price(4, 3, 2500));
-        assert!((rows - few).abs() < 1e-9 && rows > NoiseKind::Coloured.price(4, 3, 25));
-        assert!((NoiseKind::Coloured.price(4, 3, 25) - 1.5 * 25_f64.ln()).abs() < 1e-12);
+        let three = Count { lasting: 3, passing: 0 };
+        let (rows, few) = (NoiseKind::White(1.0).price(4, three, 25), NoiseKind::White(0.01).price(4, three, 2500));
+        assert!((rows - few).abs() < 1e-9 && rows > NoiseKind::Coloured.price(4, three, 25));
+        assert!((NoiseKind::Coloured.price(4, three, 25) - 1.5 * 25_f64.ln()).abs() < 1e-12);
     }
 }

@@ -74,7 +74,7 @@ mod tests {
         let u: Vec<f64> = (0..600).map(|n| 3.0 * (n as f64 * 0.07).sin()).collect();
         let drive = Drive::new(0.0, 0.05, u.len(), vec![u.clone()]).unwrap();
         let data = DataSet::of_drive(drive, vec![vec![0.0; u.len()]], 0.05);
-        let model = Model::new(&simulation, &data, &["q".into(), "w".into()], 2).unwrap();
+        let model = Model::new(&simulation, &data, 2).unwrap();
         let names = pushed(&simulation);
         assert_eq!(names, ["w"]);
         force_paths(&model, &model.theta(&Values::default()), &names)

@@ -20,11 +20,11 @@ pub struct FreeRun {
 }
 
 /// Runs a fitted simulation on data that it was not fitted to. Free initial states are estimated on the first [`HEAD`] of each stretch.
-pub fn free_run(document: &Simulation, data: &DataSet, own_states: &[String], substeps: usize) -> Option<FreeRun> {
+pub fn free_run(document: &Simulation, data: &DataSet, substeps: usize) -> Option<FreeRun> {
     let mut fixed = document.clone();
     fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
     let head = data.head(HEAD);
-    let model = Model::new(&fixed, &head, own_states, substeps).ok()?;
+    let model = Model::new(&fixed, &head, substeps).ok()?;
     let free = !model.unknowns().is_empty();
     let mut values = Values::default();
     if free && !head.y.is_empty() {
@@ -36,13 +36,11 @@ pub fn free_run(document: &Simulation, data: &DataSet, own_states: &[String], su
             values = model.values(&fit.theta);
         }
     }
-    let full = Model::new(&fixed, data, own_states, substeps).ok()?;
+    let full = Model::new(&fixed, data, substeps).ok()?;
     let (outputs, _) = full.simulate(&full.theta(&values));
     let prediction = data.stack(&outputs);
     let has_free = |stretch: usize| {
-        fixed.states.iter().any(|s| {
-            s.initial == Initial::Free || (data.stretches[stretch].samples.start > 0 && own_states.contains(&s.name))
-        })
+        fixed.states.iter().any(|s| s.initial == Initial::Free || data.stretches[stretch].samples.start > 0)
     };
     let mut scored = vec![true; data.rows()];
     for s in &data.layout.series {

@@ -1,43 +1,21 @@
 //! A simulation on a data set: what is unknown in it, its residual, its tangents.
 //!
 //! Unknown are the parameters that are not fixed (shared by all stretches), the free initial states of each stretch, and, for a stretch
-//! that begins in the middle of a recording, the initial values of all of the user's own states.
+//! that begins in the middle of a recording, the initial values of all states: what an effect remembers there is as unknown as the motion.
 
 mod adjoint;
 pub mod base;
 pub mod force;
 pub mod hold;
+mod unknowns;
 
-use std::collections::BTreeMap;
-
-use hysid_plant::{Compiled, Direction, Initial, Run, Sensitivity, Simulation, Start};
+use hysid_plant::{Compiled, Direction, Expr, Initial, Run, Sensitivity, Simulation, Start};
 use rayon::prelude::*;
 
 use crate::data::DataSet;
 use crate::refit::Problem;
-
-/// One unknown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unknown {
-    /// A parameter, by its number in the simulation.
-    Parameter(usize),
-    /// A state's value at the first sample of a stretch.
-    Initial {
-        /// The stretch.
-        stretch: usize,
-        /// The state, by its number.
-        state: usize,
-    },
-}
-
-/// Values by name: how the unknowns of one simulation are carried over to a rewriting of it.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Values {
-    /// Parameters, fixed ones included.
-    pub parameters: BTreeMap<String, f64>,
-    /// Initial values by (stretch, state).
-    pub initials: BTreeMap<(usize, String), f64>,
-}
+use unknowns::slope;
+pub use unknowns::{Count, Unknown, Values};
 
 /// A compiled simulation on a data set.
 #[derive(Debug)]
@@ -55,16 +33,11 @@ pub struct Model<'d> {
 pub type Outputs = Vec<Vec<f64>>;
 
 impl<'d> Model<'d> {
-    /// The simulation on the data. `own_states` names the states whose start is unknown in the middle of a recording.
+    /// The simulation on the data.
     ///
     /// # Errors
     /// What compiling finds.
-    pub fn new(
-        simulation: &Simulation,
-        data: &'d DataSet,
-        own_states: &[String],
-        substeps: usize,
-    ) -> Result<Self, hysid_plant::Error> {
+    pub fn new(simulation: &Simulation, data: &'d DataSet, substeps: usize) -> Result<Self, hysid_plant::Error> {
         let compiled = Compiled::new(simulation)?;
         let mut unknowns: Vec<Unknown> = compiled.estimated().into_iter().map(Unknown::Parameter).collect();
         let mut bounds: Vec<(f64, f64)> = unknowns
@@ -79,7 +52,7 @@ impl<'d> Model<'d> {
             let first = s.samples.start == 0;
             from_document.push(first);
             for (state, st) in simulation.states.iter().enumerate() {
-                if st.initial == Initial::Free || (!first && own_states.contains(&st.name)) {
+                if st.initial == Initial::Free || !first {
                     unknowns.push(Unknown::Initial { stretch, state });
                     bounds.push((f64::NEG_INFINITY, f64::INFINITY));
                 }
@@ -103,6 +76,13 @@ impl<'d> Model<'d> {
         &self.unknowns
     }
 
+    /// How many they are.
+    pub fn count(&self) -> Count {
+        let passes = |u: &&Unknown| matches!(u, Unknown::Initial { stretch, .. } if !self.from_document[*stretch]);
+        let passing = self.unknowns.iter().filter(passes).count();
+        Count { lasting: self.unknowns.len() - passing, passing }
+    }
+
     /// Integration steps in each sampling period.
     pub fn substeps(&self) -> usize {
         self.substeps
@@ -123,7 +103,7 @@ impl<'d> Model<'d> {
     }
 
     /// A `theta` from values by name; where there is none, the document's value, and the first measurement of an output that *is*
-    /// the state, else zero, for an initial value.
+    /// the state, or the slope of the first ones of which it is the derivative, else zero, for an initial value.
     pub fn theta(&self, values: &Values) -> Vec<f64> {
         self.unknowns
             .iter()
@@ -151,12 +131,17 @@ impl<'d> Model<'d> {
     }
 
     fn measured_start(&self, stretch: usize, state: &str) -> f64 {
-        self.simulation()
-            .outputs
-            .iter()
-            .position(|o| matches!(&o.expression, hysid_plant::Expr::Symbol(s) if s == state))
-            .and_then(|o| self.data.stretches[stretch].outputs[o].iter().copied().find(|v| v.is_finite()))
-            .unwrap_or(0.0)
+        let simulation = self.simulation();
+        let measured = |state: &str| {
+            let is = |e: &Expr| matches!(e, Expr::Symbol(s) if s == state);
+            let output = simulation.outputs.iter().position(|o| is(&o.expression))?;
+            Some(self.data.stretches[stretch].outputs[output].as_slice())
+        };
+        if let Some(y) = measured(state) {
+            return y.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+        }
+        let integral = simulation.states.iter().find(|s| matches!(&s.derivative, Expr::Symbol(v) if v == state));
+        integral.and_then(|x| measured(&x.name)).map_or(0.0, |y| slope(y) / self.data.period_s)
     }
 
     /// The values by name of a `theta`, fixed parameters included.

@@ -1,10 +1,9 @@
 //! What is left of the winning set's residual: whether something significant is, whether generic terms find it, and whether the set is then only
 //! an imitation of a law that the catalogue does not have.
 
-use super::needed::fitted;
-use super::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet};
-use crate::answer::file::finite;
-use crate::answer::file::{CorrectionRecord, RemainingRecord};
+use super::needed::{Refitted, fitted};
+use super::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
+use crate::answer::file::{CorrectionRecord, RemainingRecord, TermRecord, finite};
 use crate::evidence::SurrogateTest;
 use crate::search::Search;
 use crate::search::budget::Step;
@@ -24,13 +23,15 @@ const AS_MUCH: f64 = 0.5;
 const FAR_MORE: f64 = 5.0;
 
 /// What is left of a set's residual.
-pub struct Left {
+pub struct Left<'d> {
     /// The surrogate test of the residual; `None` where the set is empty or there was no time.
     test: Option<SurrogateTest>,
     /// Generic terms for the residual; `None` where no mismatch is significant or no term is chosen.
     open: Option<OpenSet>,
     /// The same in place of the set, where that explains far more.
     instead: Option<OpenSet>,
+    /// What the set leaves in its place, refitted, where that explains far more.
+    swapped: Option<Refitted<'d>>,
     /// Whether generic terms explain so much that the set is an imitation.
     pub foreign: bool,
     /// Whether the set is a sum of relaxations, which stands for a memory with many time scales.
@@ -40,9 +41,9 @@ pub struct Left {
     alpha: f64,
 }
 
-impl Left {
+impl<'d> Left<'d> {
     /// Of the `winner` of a pool whose first set is the simulation without effects.
-    pub fn of(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize, significant: bool) -> Self {
+    pub fn of(search: &Search<'_, 'd>, pool: &[Hypothesis<'d>], winner: usize, significant: bool) -> Self {
         let (best, none) = (&pool[winner], &pool[0]);
         let alpha = search.options.alpha;
         let budget = search.setting.budget;
@@ -54,14 +55,23 @@ impl Left {
         let generic = if winner > 0 { search.open(none) } else { None };
         let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
         let outdone = generic.as_ref().is_some_and(outdone);
+        // Where the set is an imitation, what it leaves is a small part of what is really missing: the right term shows beside the wrong effects.
+        // The regression, which knows the simulation without effects only by its tangent, may choose another one there.
+        let swapped = seen.filter(|_| winner > 0 && !outdone).and_then(|o| {
+            let Writable::Sparse(terms) = o.writable.as_ref()? else { return None };
+            let alone = Writable::Sparse(terms.within(none.base.document()));
+            let swapped = fitted(&search.setting, none, &alone)?;
+            (swapped.hypothesis.log_evidence > best.log_evidence + o.choice + FAR_MORE).then_some(swapped)
+        });
+        let outdone = outdone || swapped.is_some();
         let foreign = winner > 0 && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
         // What was not looked at is not known to be nothing.
         let significant = |t: &SurrogateTest| t.p_value < alpha;
         let imperfect = winner > 0 && (foreign || spectrum || seen.is_some() || test.as_ref().is_none_or(significant));
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
-        let instead = generic.filter(|g| spectrum || (outdone && g.gain > both));
-        Self { test, open, instead, foreign, spectrum, imperfect, alpha }
+        let instead = generic.filter(|g| spectrum || (outdone && swapped.is_none() && g.gain > both));
+        Self { test, open, instead, swapped, foreign, spectrum, imperfect, alpha }
     }
 
     /// As it is reported; `None` where it was not looked at.
@@ -85,8 +95,8 @@ impl Left {
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
     /// evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool):
     /// three or four blocks tell little of a mismatch far below the noise, so they need not rule out chance where the evidence does.
-    pub fn modelled<'d>(
-        &self,
+    pub fn modelled(
+        &mut self,
         search: &Search<'_, 'd>,
         pool: &[Hypothesis<'d>],
         winner: usize,
@@ -97,19 +107,45 @@ impl Left {
             return None;
         }
         let setting = &search.setting;
-        let instead = if winner > 0 { search.open(&pool[0]) } else { None };
-        let best = [(winner, self.open.as_ref()), (0, instead.as_ref())]
-            .into_iter()
-            .filter_map(|(i, open)| {
-                let (parent, open) = (&pool[i], open?);
-                Some((fitted(setting, parent, open.writable.as_ref()?)?, self.stands_by_evidence(open)))
-            })
-            .max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))?;
+        let swapped = self.take_swapped();
+        let replaced = swapped.is_some();
+        let refitted = |(i, open): (usize, Option<&OpenSet>)| {
+            let (parent, open) = (&pool[i], open?);
+            Some((fitted(setting, parent, open.writable.as_ref()?)?.hypothesis, self.stands_by_evidence(open)))
+        };
+        let best = match swapped {
+            Some(h) => Some((h, true)),
+            None => {
+                let instead = if winner > 0 { search.open(&pool[0]) } else { None };
+                [(winner, self.open.as_ref()), (0, instead.as_ref())]
+                    .into_iter()
+                    .filter_map(refitted)
+                    .max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))
+            }
+        }?;
         let (best, sure) = best;
         let (_, before) = block_score(setting, &pool[otherwise])?;
         let (_, after) = block_score(setting, &best)?;
-        let better = after.iter().sum::<f64>() < before.iter().sum::<f64>();
+        let ratio = (after.iter().sum::<f64>() / before.iter().sum::<f64>()).sqrt();
+        let better = ratio < 1.0;
+        if let Some(open) = self.open.as_mut().filter(|_| replaced) {
+            (open.gain, open.block_ratio) = (best.log_evidence - pool[0].log_evidence - open.choice, ratio);
+        }
         ((sure && better) || better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
+    }
+
+    /// The simulation with what stands in the set's place; its terms are told from now on.
+    fn take_swapped(&mut self) -> Option<Hypothesis<'d>> {
+        let Refitted { hypothesis, terms } = self.swapped.take()?;
+        if let Some(open) = &mut self.open {
+            let told = std::mem::take(&mut open.record.terms);
+            let with = |t: TermRecord| {
+                let (_, coefficient) = terms.iter().find(|(text, _)| *text == t.term)?;
+                Some(TermRecord { coefficient: *coefficient, ..t })
+            };
+            open.record.terms = told.into_iter().filter_map(with).collect();
+        }
+        Some(hypothesis)
     }
 
     /// The correction that is told: in place of the set, or of what it leaves.

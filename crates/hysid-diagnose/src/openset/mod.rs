@@ -27,6 +27,7 @@ use hysid_select::{Criterion, Options as Selecting, select};
 use crate::answer::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::data::held_out_blocks;
 use crate::evidence::{Projector, Whitener, norm2};
+use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use regress::regress;
 use signature::signature;
@@ -44,6 +45,8 @@ pub struct OpenSet {
     pub block_ratio: f64,
     /// Log evidence that it adds: its terms pay for their coefficients, and for having been chosen out of many.
     pub gain: f64,
+    /// What of it is paid for the choice.
+    pub choice: f64,
     /// The fitted simulation with the correction in it, not yet refitted; `None` where a parameter walks, or where a term is a function of the time
     /// in this recording beside others that are not: such a term mends what the others miss, and says nothing of another recording.
     pub writable: Option<Writable>,
@@ -87,6 +90,7 @@ struct Chosen {
     /// The noise of what is left.
     left: Whitener,
     gain: f64,
+    choice: f64,
 }
 
 /// The correction of what is left of a fitted simulation's residual: sparse terms or a parameter that varies, whichever has more evidence; `None`
@@ -144,6 +148,7 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
         record: CorrectionRecord { slot, terms: records, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &best.left, 0.0),
         gain: best.gain,
+        choice: best.choice,
         writable,
         words: None,
     }
@@ -170,6 +175,7 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         record: CorrectionRecord { slot: format!("{place}:{}", found.symbol), terms: records, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),
         gain: found.gain,
+        choice: 0.0,
         writable: with_oscillation(&base.document(), &found).map(Writable::Oscillation),
         words: Some(found.words()),
     }
@@ -212,7 +218,15 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
             - spared(data, &base.whitener, &base.whitener));
     // Generic terms pay for their coefficients what an effect pays for its parameters, and for having been chosen out of many.
     let among: f64 = (0..chosen.len()).map(|k| ((usable.len() - k) as f64 / (k + 1) as f64).ln()).sum();
-    let price = kind.price(base.model.unknowns().len(), chosen.len(), after.len()) + among;
+    let further = Count { lasting: chosen.len(), passing: 0 };
+    let price = kind.price(base.model.count().lasting, further, after.len()) + among;
     let err = selection.steps.iter().map(|s| s.err).collect();
-    Some(Chosen { terms: chosen, err, coefficients, left, gain: likelihood - base.log_likelihood - price })
+    Some(Chosen {
+        terms: chosen,
+        err,
+        coefficients,
+        left,
+        gain: likelihood - base.log_likelihood - price,
+        choice: among,
+    })
 }

@@ -60,8 +60,7 @@ impl<'d> Modulated<'d> {
             document.inputs.push(Input { symbol: name.clone(), column: name.clone() });
             multiply(&mut document, symbol, &(Expr::Number(1.0) + Expr::symbol(&name)));
         }
-        let states: Vec<String> = document.states.iter().map(|s| s.name.clone()).collect();
-        let model = Model::new(&document, data, &states, base.model.substeps()).ok()?;
+        let model = Model::new(&document, data, base.model.substeps()).ok()?;
         let theta = model.theta(&base.values());
         Some(Self { model, theta, places })
     }

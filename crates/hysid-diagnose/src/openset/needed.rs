@@ -11,15 +11,25 @@ use crate::model::base::Base;
 use crate::search::budget::Step;
 use crate::search::hypothesis::{Hypothesis, Setting};
 
+/// A correction that was refitted in the equations.
+pub struct Refitted<'d> {
+    /// The simulation with it.
+    pub hypothesis: Hypothesis<'d>,
+    /// The terms that it needs there, with their coefficients; none for a parameter that oscillates.
+    pub terms: Vec<(String, f64)>,
+}
+
 /// The correction fitted in the place of, or on top of, a set, without the terms that it does not need.
-pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable) -> Option<Hypothesis<'d>> {
+pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable) -> Option<Refitted<'d>> {
     let fit = |simulation: &Simulation| {
         let (from, noise) = (parent.base.values(), Some(&parent.base.whitener));
         let base = setting.fit(simulation, &from, noise, 2, setting.iterations)?;
         Some(setting.hypothesis(parent.effects.clone(), base))
     };
     let mut sparse = match writable {
-        Writable::Oscillation(simulation) => return fit(simulation),
+        Writable::Oscillation(simulation) => {
+            return Some(Refitted { hypothesis: fit(simulation)?, terms: Vec::new() });
+        }
         Writable::Sparse(sparse) => sparse.clone(),
     };
     let (simulation, mut names) = sparse.written()?;
@@ -30,7 +40,10 @@ pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Wri
         }
         (sparse, names, best) = (fewer, its_names, h);
     }
-    Some(best)
+    let values = best.base.values().parameters;
+    let coefficient = |names: &Vec<String>| names.first().and_then(|n| values.get(n)).copied().unwrap_or(0.0);
+    let terms = sparse.texts().map(str::to_owned).zip(names.iter().map(coefficient)).collect();
+    Some(Refitted { hypothesis: best, terms })
 }
 
 /// The correction without the term whose coefficient is the smallest beside its standard error.

@@ -15,6 +15,7 @@ use super::regress::regress;
 use crate::answer::text::number;
 use crate::evidence::{Layout, Projector, Wander, Whitener, dot, lines, norm2, score};
 use crate::mechanism::SLOW;
+use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use crate::random::generator;
 
@@ -247,7 +248,7 @@ fn judged(
             (share * view.log_likelihood(base) + Wander::new(&white, &view.r, share).mean_gain().0, among + SLOW)
         }
         Course::Line(_) => {
-            let both = kind.price(base.model.unknowns().len(), 2, data.rows());
+            let both = kind.price(base.model.count().lasting, Count { lasting: 2, passing: 0 }, data.rows());
             let lines = time.samples().max(2) as f64;
             (
                 share * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)),
@@ -313,7 +314,7 @@ mod tests {
     }
 
     fn model<'d>(simulation: &Simulation, data: &'d DataSet) -> Model<'d> {
-        Model::new(simulation, data, &["x".into(), "v".into()], 2).unwrap()
+        Model::new(simulation, data, 2).unwrap()
     }
 
     fn fitted(data: &DataSet) -> Base<'_> {

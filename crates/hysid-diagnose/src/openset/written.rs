@@ -41,6 +41,17 @@ impl Sparse {
         Self { simulation, members }
     }
 
+    /// The same terms in another simulation, from where the regression had them.
+    pub fn within(&self, simulation: Simulation) -> Self {
+        let bare = |m: &Member| Member { fitted: Vec::new(), ..m.clone() };
+        Self { simulation, members: self.members.iter().map(bare).collect() }
+    }
+
+    /// The terms as they are written.
+    pub fn texts(&self) -> impl Iterator<Item = &str> {
+        self.members.iter().map(|m| m.term.text.as_str())
+    }
+
     /// The simulation with them, and the names of each one's parameters: its coefficient, then its shapes.
     pub fn written(&self) -> Option<(Simulation, Vec<Vec<String>>)> {
         let (mut simulation, names) =
@@ -194,6 +205,33 @@ mod tests {
         assert_eq!((x("u*v"), x("sign(x)*v"), x("v*cos(3*x)")), (0, 0, 0));
     }
 
+    /// Terms that were seen beside an effect stand in the simulation without it, and start anew there.
+    #[test]
+    fn terms_that_an_effect_left_stand_in_its_place() {
+        let plain = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut with_effect = plain.clone();
+        with_effect.parameters.push(Parameter::new("h", 2.0).within(0.0, 9.0));
+        with_effect.states[1].derivative = Expr::parse("(u - c*v - k*x - h*x^5)/m").unwrap();
+        let term = Term {
+            text: "x*abs(v)".into(),
+            coordinates: ["x", "v"]
+                .map(|n| Coordinate { name: n.into(), meaning: Expr::symbol(n), held: Expr::symbol(n) })
+                .into(),
+            place: Place::State(1),
+            kind: crate::openset::terms::Kind::Odd,
+            side: "plant",
+            slot: "state:v".into(),
+            column: Vec::new(),
+        };
+        let beside = Sparse::new(with_effect, [(term, -3.0)].into_iter());
+        let (written, names) = beside.within(plain.clone()).written().unwrap();
+        assert!(written.parameter("h").is_none() && written.parameters.len() == plain.parameters.len() + 1);
+        assert_eq!(written.parameter(&names[0][0]).map(|p| p.value), Some(-3.0));
+        let expected = plain.states[1].derivative.clone() + Expr::parse("g*(x*abs(v))").unwrap();
+        assert_eq!(written.states[1].derivative.to_string(), expected.to_string());
+        assert_eq!(beside.texts().collect::<Vec<_>>(), ["x*abs(v)"]);
+    }
+
     /// What regression on the tangent saw and what is written and refitted must be the same term: its response is the derivative of the
     /// written simulation by its coefficient, for each of the terms at every slot.
     #[test]
@@ -204,7 +242,7 @@ mod tests {
         let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
         let simulation = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let data = DataSet::new(&simulation, &[recording], 3).unwrap();
-        let model = |s: &Simulation| Model::new(s, &data, &["x".into(), "v".into()], 2).unwrap();
+        let model = |s: &Simulation| Model::new(s, &data, 2).unwrap();
         let start = Values::default();
         let base = fit_simulation(
             model(&simulation),

@@ -10,7 +10,7 @@ use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Rewritten};
 use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
-use crate::model::{Model, Values};
+use crate::model::{Count, Model, Values};
 use crate::refit::{LmOptions, go_on};
 use crate::slot::Slot;
 
@@ -83,14 +83,12 @@ pub struct Setting<'d> {
     pub data: &'d DataSet,
     /// The user's simulation.
     pub original: Simulation,
-    /// Names of its states.
-    pub own_states: Vec<String>,
     /// Names of the states whose derivative an unknown force or flow may enter.
     pub pushed: Vec<String>,
     /// Integration steps in each period.
     pub substeps: usize,
     /// Number of unknowns of the simulation without effects.
-    pub own_unknowns: usize,
+    pub own_unknowns: Count,
     /// Iterations of a refit on the short list.
     pub iterations: usize,
     /// How noise is modelled.
@@ -131,7 +129,7 @@ impl<'d> Setting<'d> {
         rounds: usize,
         iterations: usize,
     ) -> Option<Base<'d>> {
-        let model = Model::new(document, self.data, &self.own_states, self.substeps).ok()?;
+        let model = Model::new(document, self.data, self.substeps).ok()?;
         let options = LmOptions { iterations, ..LmOptions::default() };
         fit_simulation(model, start, &self.pushed, noise, rounds, options, self.noise)
     }
@@ -144,8 +142,8 @@ impl<'d> Setting<'d> {
 
     /// The evidence of a fitted document.
     pub fn evidence(&self, base: &Base<'_>) -> f64 {
-        let further = base.model.unknowns().len().saturating_sub(self.own_unknowns);
-        base.log_likelihood - self.noise.price(self.own_unknowns, further, self.data.rows())
+        let further = base.model.count().beyond(self.own_unknowns);
+        base.log_likelihood - self.noise.price(self.own_unknowns.lasting, further, self.data.rows())
     }
 }
 
@@ -159,17 +157,16 @@ pub fn calibrated<'d>(
 ) -> (Setting<'d>, Hypothesis<'d>) {
     let mut setting = Setting {
         data,
-        own_states: original.states.iter().map(|s| s.name.clone()).collect(),
         pushed: crate::model::force::pushed(&original),
         original,
         substeps: 2,
-        own_unknowns: 0,
+        own_unknowns: Count::default(),
         iterations: 12,
         noise,
         budget,
     };
     let base = setting.fit(&setting.original, &Values::default(), None, 3, 25).unwrap();
-    setting.own_unknowns = base.model.unknowns().len();
+    setting.own_unknowns = base.model.count();
     let none = setting.hypothesis(Vec::new(), base);
     (setting, none)
 }

@@ -240,8 +240,7 @@ fn features(
             p.fixed = true;
         }
     }
-    let own_states: Vec<String> = base.model.simulation().states.iter().map(|s| s.name.clone()).collect();
-    let model = Model::new(&document, data, &own_states, base.model.substeps()).ok()?;
+    let model = Model::new(&document, data, base.model.substeps()).ok()?;
     let start = with_added_starts(values, screening, slot, data.stretches.len());
     let mut theta = model.theta(&start);
     let places: Vec<usize> = screening.amplitudes.iter().filter_map(|a| model.place_of(&a.name)).collect();

@@ -196,7 +196,7 @@ fn wordings(pool: &[Hypothesis<'_>], winner: usize) -> Vec<usize> {
 fn overpriced(general: &Hypothesis<'_>, special: &Hypothesis<'_>) -> f64 {
     let amplitudes = |h: &Hypothesis<'_>| h.effects.iter().map(|e| e.written.amplitudes.len()).sum::<usize>();
     let price = |h: &Hypothesis<'_>| h.base.log_likelihood - h.log_evidence;
-    let further = general.base.model.unknowns().len().saturating_sub(special.base.model.unknowns().len());
+    let further = general.base.model.count().beyond(special.base.model.count()).lasting;
     let paid = price(general) - price(special);
     if further == 0 || paid <= 0.0 || amplitudes(general) != amplitudes(special) {
         return 0.0;
