@@ -1,6 +1,6 @@
 //! What `hysid diagnose` says of the baselines of the public recordings, each of which leaves something out.
 //!
-//! The finished binary runs with defaults and one thread; files for estimation and hold-out are those that the head of each
+//! The finished binary runs with defaults and two threads; files for estimation and hold-out are those that the head of each
 //! simulation names. A recording without a split of its own is cut at the row that the head names. What the literature says is missing
 //! stands in `docs/recordings.md`, written before the first run.
 
@@ -70,7 +70,7 @@ const HEAD: &str = "| recording | verdict | effects (probability) | hold-out | b
 pub(super) fn table(recordings: &Path, simulations: &Path, only: Option<&str>) -> anyhow::Result<String> {
     let binary = crate::prove::build()?;
     let mut text = format!(
-        "`hysid diagnose`, one thread, `--time-limit {TIME_LIMIT}`; errors in the unit of the output.\n\n{HEAD}"
+        "`hysid diagnose`, two threads, `--time-limit {TIME_LIMIT}`; errors in the unit of the output.\n\n{HEAD}"
     );
     for baseline in BASELINES.iter().filter(|b| only.is_none_or(|o| b.name.contains(o))) {
         eprintln!("{}", baseline.name);
@@ -95,7 +95,7 @@ impl Baseline {
             });
         }
         let start = Instant::now();
-        let ran = command.args(["--threads", "1", "--time-limit", TIME_LIMIT, "--out"]).arg(&out).output()?;
+        let ran = command.args(["--threads", "2", "--time-limit", TIME_LIMIT, "--out"]).arg(&out).output()?;
         let seconds = start.elapsed().as_secs_f64();
         ensure!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
         rows(self.name, &std::fs::read_to_string(out.join("diagnosis.json"))?, seconds)

@@ -6,9 +6,12 @@ use super::{DataSet, held_out_blocks};
 use crate::error::DiagnoseError;
 use crate::request::{Hooks, Request};
 
-/// Most samples that the search works on; a longer recording is used in windows. What a simulation remembers at the start of a window is unknown, so
-/// that only a recording that no search can afford is cut.
-const MOST_SAMPLES: usize = 26_000;
+/// Most samples that the search works on as they are. What a simulation remembers at the start of a window is unknown, so that only a recording that
+/// no search can afford is cut.
+const MOST_WHOLE: usize = 26_000;
+
+/// Most samples in the windows of a longer one: a search costs what it reads, and its time is limited.
+const MOST_IN_WINDOWS: usize = 12_000;
 
 /// What a diagnosis works on.
 pub struct Intake {
@@ -54,7 +57,8 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
     if request.holdout.is_empty() {
         notes.push("no hold-out recording was given: blocks of the recordings were held out and score the fit".into());
     }
-    let data = full.within(MOST_SAMPLES).thinned();
+    let windowed = (full.samples() > MOST_WHOLE).then(|| full.within(MOST_IN_WINDOWS));
+    let data = windowed.as_ref().unwrap_or(&full).thinned();
     notes.extend(data.notes.iter().filter(|n| !full.notes.contains(n)).cloned());
     Ok(Intake { data, held, notes })
 }
