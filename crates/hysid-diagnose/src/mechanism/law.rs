@@ -21,7 +21,9 @@ pub enum Purpose {
 /// Another form of a law. A law that has no such form is written as the plain one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Form {
-    /// A series with a few shape parameters in place of a weight for each term: a smooth density of plays.
+    /// A weight for each of a few terms, in place of a series with a few shape parameters: three plays for a smooth density.
+    Few,
+    /// The series in another arrangement: plays that widen with the rate in place of a lag behind them.
     Smooth,
     /// More terms, for recordings that are sharp enough to tell: six plays in place of three, a lag that does not start settled.
     Finer,
@@ -31,8 +33,13 @@ pub enum Form {
 
 impl Purpose {
     /// What a law is fitted as, in the order in which the forms are tried.
-    pub const FITTED: [Self; 4] =
-        [Self::Refit, Self::Form(Form::Smooth), Self::Form(Form::Finer), Self::Form(Form::Spaced)];
+    pub const FITTED: [Self; 5] = [
+        Self::Refit,
+        Self::Form(Form::Smooth),
+        Self::Form(Form::Few),
+        Self::Form(Form::Finer),
+        Self::Form(Form::Spaced),
+    ];
 }
 
 /// How the law's text enters the simulation at its slot.

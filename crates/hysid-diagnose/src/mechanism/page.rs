@@ -6,12 +6,38 @@ use super::conformance::specimens;
 use super::{Change, Family, Grid, Law, Mechanism, Purpose, Role, catalogue};
 use crate::slot::{Place, Slot, Structure};
 
+/// The first half-width of a density's plays, by which its terms are known.
+const FIRST_CELL: &str = "0.5*r_w";
+
+/// A law's text with the terms of a density told once.
+fn folded(text: &str) -> String {
+    let mut left = text;
+    let mut out = String::new();
+    while let Some(at) = left.find(FIRST_CELL) {
+        let start = left[..at].rfind(" + ").map_or(0, |i| i + 3);
+        let length = left[start..].find(" + ").unwrap_or(left.len() - start);
+        let term = &left[start..start + length];
+        let (mut end, mut last) = (start + length, 0);
+        loop {
+            let next = format!(" + {}", term.replace(FIRST_CELL, &format!("{}.5*r_w", last + 1)));
+            if !left[end..].starts_with(&next) {
+                break;
+            }
+            end += next.len();
+            last += 1;
+        }
+        let _ = write!(out, "{}sum({}; i = 0.5 .. {last}.5)", &left[..start], term.replace(FIRST_CELL, "i*r_w"));
+        left = &left[end..];
+    }
+    out + left
+}
+
 fn law_text(law: &Law) -> String {
     match &law.change {
         Change::Force(text) => format!("resisting force `{text}`"),
         Change::Drive(text) => format!("external force `{text}`"),
         Change::Outflow(text) => format!("outflow `{text}`"),
-        Change::Replace(text) => format!("becomes `{text}`"),
+        Change::Replace(text) => format!("becomes `{}`", folded(text)),
         Change::Inertia { force, mass } => format!("further mass `{mass}` with the force `{force}`"),
         Change::Separation { at, by } => {
             format!("the simulation's own separation becomes `{by}`, where `ahead` is the separation at `{at}`")
@@ -67,7 +93,7 @@ pub fn catalogue_page() -> String {
          in: its unit, and its natural size on a recording. `w` is the weight of a form that exists for screening only. Where an input `control`\n\
          controls the simulation's own damping (the voltage of a magnetorheological damper), the forces of `dry_friction`, `presliding` and\n\
          `hysteretic_spring` are multiplied by `1 + b_c*control`. Laws are shown in their plain form; what not every form of a law tells stands in\n\
-         square brackets in its sentence.\n",
+         square brackets in its sentence. `sum(...; i = 0.5 .. 11.5)` stands for one term for each `i` in steps of 1.\n",
     );
     let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
     for family in Family::ALL {
@@ -138,6 +164,18 @@ fn entry(page: &mut String, mechanism: &Mechanism, structures: &[Structure]) {
 
 #[cfg(test)]
 mod tests {
+    use super::folded;
+
+    #[test]
+    fn terms_of_a_density_are_told_once() {
+        let check = |text: &str, expected: &str| assert_eq!(folded(text), expected);
+        check("u + p*(play(u, r_1) - u)", "u + p*(play(u, r_1) - u)");
+        let three = "p*f(0.5*r_w) + p*f(1.5*r_w) + p*f(2.5*r_w)";
+        check(&format!("u + {three} + a*u"), "u + sum(p*f(i*r_w); i = 0.5 .. 2.5) + a*u");
+        let twice = "u + sum(p*f(i*r_w); i = 0.5 .. 2.5) + b*max(u + sum(p*f(i*r_w); i = 0.5 .. 1.5), 0)";
+        check(&format!("u + {three} + b*max(u + p*f(0.5*r_w) + p*f(1.5*r_w), 0)"), twice);
+    }
+
     #[test]
     fn the_page_in_the_documents_is_this_one() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/catalogue.md");

@@ -47,13 +47,7 @@ pub fn finer<'d>(
         if setting.budget.omits(Step::Fits) {
             break;
         }
-        let Some(other) = written_as(setting, trunk, h, index, &present, (purpose, &law)) else { continue };
-        // Where more unknowns bring nothing, still more of them will not.
-        let done = more && other.log_evidence < h.log_evidence;
-        forms.push(other);
-        if done {
-            break;
-        }
+        forms.extend(written_as(setting, trunk, h, index, &present, (purpose, &law)));
     }
     let merits: Vec<(f64, f64)> =
         std::iter::once(h).chain(&forms).map(|f| (f.log_evidence, f.base.log_likelihood)).collect();

@@ -1,9 +1,10 @@
 //! The plays that the laws of an actuator's hysteresis are sums of, in each of the forms that such a law is fitted in.
 //!
-//! Three plays are what most recordings tell. More are taken where the evidence asks for them:
-//! - a density that falls off with the half-width, half of a normal one over twelve cells: two numbers follow a smooth loop, and there is no
-//!   weight that the recording leaves open;
-//! - six plays with half-widths that are shares of the input's reach;
+//! The plain form is a density that falls off with the half-width, half of a normal one over twelve cells: two numbers follow a smooth loop, and
+//! there is no weight that the recording leaves open. A faint loop is seen by one column for each width, where a column for each of three plays
+//! would have to explain more than twice as much. Where the evidence asks for it there are
+//! - three plays with half-widths that are shares of the input's reach;
+//! - six of them;
 //! - six whose half-widths are the multiples of one spacing that is fitted too. The initial loading curve of such an operator is made of
 //!   straight pieces, and on a sharp recording pieces that end at the wrong places show.
 //!
@@ -19,6 +20,14 @@ const SPACED: usize = 6;
 /// Cells of a density.
 const CELLS: usize = 12;
 
+/// The cells of a density of width `r_d`, as text: the share of each and its half-width.
+pub(super) fn density() -> impl Iterator<Item = (String, String)> {
+    (0..CELLS).map(|i| {
+        let radius = format!("{i}.5*r_w");
+        (format!("exp(-({radius}/r_d)^2)/{CELLS}"), radius)
+    })
+}
+
 /// The plays of a law in one form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Plays(pub Purpose);
@@ -26,20 +35,17 @@ pub(super) struct Plays(pub Purpose);
 impl Plays {
     /// The half-widths of plays that stand where the input's reach says.
     fn radii(self) -> &'static [f64] {
-        if self.0 == Purpose::Form(Form::Finer) { RADII[1] } else { RADII[0] }
+        if self.0 == Purpose::Form(Form::Few) { RADII[0] } else { RADII[1] }
     }
 
     /// What each play weighs, and its half-width.
     fn terms(self) -> Vec<(String, String)> {
         match self.0 {
-            Purpose::Form(Form::Smooth) => (0..CELLS)
-                .map(|i| {
-                    let radius = format!("{i}.5*r_w");
-                    (format!("p/{CELLS}*exp(-({radius}/r_d)^2)"), radius)
-                })
-                .collect(),
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth) => {
+                density().map(|(share, radius)| (format!("p*{share}"), radius)).collect()
+            }
             Purpose::Form(Form::Spaced) => (1..=SPACED).map(|i| (format!("p_{i}"), format!("{i}*r_s"))).collect(),
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Finer) => {
+            Purpose::Form(Form::Few | Form::Finer) => {
                 (1..=self.radii().len()).map(|i| (format!("p_{i}"), format!("r_{i}"))).collect()
             }
         }
@@ -57,7 +63,7 @@ impl Plays {
         let law = Law::replace(text);
         let weight = |law: Law, i: usize| law.amplitude(format!("p_{i}"), "1", -0.2, 1.0);
         let law = match self.0 {
-            Purpose::Form(Form::Smooth) => law
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth) => law
                 .amplitude("p", "1", -0.2, 5.0)
                 .shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0]))
                 .constant("r_w", "u", Grid::Reach("u", vec![1.0 / CELLS as f64])),
@@ -66,7 +72,7 @@ impl Plays {
                 "u",
                 Grid::Reach("u", [0.8, 1.0, 1.2].map(|s| s / (SPACED + 1) as f64).to_vec()),
             ),
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Finer) => {
+            Purpose::Form(Form::Few | Form::Finer) => {
                 self.radii().iter().zip(1..).fold(law, |law, (share, i)| {
                     weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
                 })
@@ -107,9 +113,9 @@ mod tests {
     fn values(purpose: Purpose) -> Vec<(&'static str, f64)> {
         let six = [("p_1", 0.03), ("p_2", 0.08), ("p_3", 0.02), ("p_4", 0.06), ("p_5", 0.01), ("p_6", 0.05)];
         match purpose {
-            Purpose::Screening | Purpose::Refit => six[..3].to_vec(),
+            Purpose::Form(Form::Few) => six[..3].to_vec(),
             Purpose::Form(Form::Finer) => six.to_vec(),
-            Purpose::Form(Form::Smooth) => vec![("p", 0.4), ("r_d", 4.0)],
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth) => vec![("p", 0.4), ("r_d", 4.0)],
             Purpose::Form(Form::Spaced) => six.into_iter().chain([("r_s", 1.3)]).collect(),
         }
     }
@@ -139,7 +145,7 @@ mod tests {
     fn twelve_cells_are_a_density() {
         let (share, width, reach) = (0.4, 4.0, 10.0);
         let up: Vec<f64> = (0..=100).map(|i| 0.1 * f64::from(i)).collect();
-        let (y, _) = answer(Purpose::Form(Form::Smooth), &[("p", share), ("r_d", width)], &up);
+        let (y, _) = answer(Purpose::Refit, &[("p", share), ("r_d", width)], &up);
         let fine = 20_000;
         let cell = reach / f64::from(fine);
         for (u, y) in up.iter().zip(y) {
@@ -157,8 +163,7 @@ mod tests {
     fn the_response_moves_with_a_fitted_half_width() {
         let input: Vec<f64> =
             (0..300).map(|i| 9.0 * (0.05 * f64::from(i)).sin() * (0.013 * f64::from(i)).cos()).collect();
-        for (purpose, name, at) in [(Form::Smooth, "r_d", 4.0), (Form::Spaced, "r_s", 1.3)] {
-            let purpose = Purpose::Form(purpose);
+        for (purpose, name, at) in [(Purpose::Refit, "r_d", 4.0), (Purpose::Form(Form::Spaced), "r_s", 1.3)] {
             let shifted = |by: f64| -> Vec<f64> {
                 let mut set = values(purpose);
                 set.iter_mut().filter(|(n, _)| *n == name).for_each(|(_, v)| *v = at + by);

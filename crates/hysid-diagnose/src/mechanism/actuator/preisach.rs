@@ -1,11 +1,16 @@
 //! Hysteresis of an actuator with a general weight over its turning points.
 
-use super::plays::Plays;
-use crate::mechanism::{Block, Family, Form, Grid, Mechanism, Need, Purpose, anywhere};
+use super::plays::{Plays, density};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
-/// Plays in the plain form: each has three amplitudes, and twice as many follow one recording and no other.
+/// Plays that are bent each on its own: each has three amplitudes, and twice as many follow one recording and no other.
 const PLAYS: usize = 3;
+
+/// The law with the input's reach, by which levels are scaled, and the largest level that the recording has.
+fn scaled(law: Law) -> Law {
+    law.constant("u_r", "u", Grid::Reach("u", vec![1.0])).constant("u_m", "u", Grid::Quantiles("u", vec![1.0]))
+}
 
 /// Hysteresis of an actuator with a general weight over its turning points.
 pub static PREISACH: Mechanism = Mechanism {
@@ -20,34 +25,30 @@ pub static PREISACH: Mechanism = Mechanism {
         // reached: a polynomial that runs on is no model of a hysteresis.
         let play = |r: &str| format!("play(u, {r})");
         let within = |r: &str| format!("max(min({}, u_m), -u_m)", play(r));
-        if let Purpose::Form(form @ (Form::Smooth | Form::Finer)) = purpose {
-            // Alike for all plays: the density is a product of a function of the half-width and one of the level.
-            let plays = Plays(Purpose::Form(Form::Smooth));
-            let level = |r: &str| match form {
-                Form::Finer => format!("1 + b*{w}/u_r + c*{w}^2/u_r^2", w = within(r)),
-                _ => format!("1 + b*{}/u_r", within(r)),
+        // Each play bent on its own, to the third degree.
+        if let Purpose::Form(Form::Few) = purpose {
+            let plays = Plays(purpose);
+            let curved = |i: usize| {
+                let r = format!("r_{i}");
+                format!(" + {}*(q_{i}*{w}/u_r + s_{i}*{w}^2/u_r^2)", play(&r), w = within(&r))
             };
-            let law = plays
-                .law(plays.sum(|r| format!("{}*({})", play(r), level(r))))
-                .amplitude("b", "1", -1.0, 1.0)
-                .constant("u_r", "u", Grid::Reach("u", vec![1.0]))
-                .constant("u_m", "u", Grid::Quantiles("u", vec![1.0]));
-            return if form == Form::Finer { law.amplitude("c", "1", -1.0, 1.0) } else { law };
+            let bent: String = (1..=PLAYS).map(curved).collect();
+            let law = scaled(plays.law(format!("{}{bent}", plays.sum(play))));
+            return (1..=PLAYS).fold(law, |law, i| {
+                law.amplitude(format!("q_{i}"), "1", -1.0, 1.0).amplitude(format!("s_{i}"), "1", -1.0, 1.0)
+            });
         }
-        // Of degree three, each on its own.
+        // Alike for all plays: the density is a product of a function of the half-width and one of the level.
         let plays = Plays(Purpose::Refit);
-        let curved = |i: usize| {
-            let r = format!("r_{i}");
-            format!(" + {}*(q_{i}*{w}/u_r + s_{i}*{w}^2/u_r^2)", play(&r), w = within(&r))
+        let square = purpose == Purpose::Form(Form::Finer);
+        let curved = |(share, r): (String, String)| {
+            let (play, w) = (play(&r), within(&r));
+            let second = if square { format!(" + s*{share}*{play}*{w}^2/u_r^2") } else { String::new() };
+            format!(" + q*{share}*{play}*{w}/u_r{second}")
         };
-        let bent: String = (1..=PLAYS).map(curved).collect();
-        let mut law = plays.law(format!("{}{bent}", plays.sum(play)));
-        law =
-            law.constant("u_r", "u", Grid::Reach("u", vec![1.0])).constant("u_m", "u", Grid::Quantiles("u", vec![1.0]));
-        for i in 1..=PLAYS {
-            law = law.amplitude(format!("q_{i}"), "1", -1.0, 1.0).amplitude(format!("s_{i}"), "1", -1.0, 1.0);
-        }
-        law
+        let bent: String = density().map(curved).collect();
+        let law = scaled(plays.law(format!("{}{bent}", plays.sum(play)))).amplitude("q", "1", -5.0, 5.0);
+        if square { law.amplitude("s", "1", -5.0, 5.0) } else { law }
     },
     contains: &["prandtl_ishlinskii", "backlash"],
     confusable: &["prandtl_ishlinskii", "asymmetric_hysteresis"],

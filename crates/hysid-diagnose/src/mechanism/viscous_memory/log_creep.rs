@@ -11,13 +11,15 @@ pub static LOG_CREEP: Mechanism = Mechanism {
     places: &[Place::Input, Place::Sensor],
     applies: anywhere,
     already: &["lag(u, P)", "lag(y, P)"],
-    law: |slot, _| {
-        // The logarithm of time as three relaxations, a decade apart.
+    law: |slot, purpose| {
+        // The logarithm of time as three relaxations, a decade apart until the recording tells how far.
         let s = if slot.place == Place::Sensor { "y" } else { "u" };
-        Law::replace(format!("{s} + gamma*(lag({s}, tau_1) + lag({s}, 10*tau_1) + lag({s}, 100*tau_1) - 3*{s})"))
+        let relaxed = format!("lag({s}, tau_1) + lag({s}, rho*tau_1) + lag({s}, rho^2*tau_1)");
+        Law::replace(format!("{s} + gamma*log10(rho)*({relaxed} - 3*{s})"))
             .amplitude("gamma", "1", 0.0, 0.3)
             .shape("tau_1", "T", Grid::Values(vec![0.001, 0.003, 0.01]))
             .within(0.0001, 0.1)
+            .detail(purpose, "rho", "1", vec![10.0], (3.0, 30.0))
     },
     contains: &[],
     confusable: &["sensor_drift", "parameter_drift", "viscoelastic"],
