@@ -50,10 +50,29 @@ pub struct Lesson<'d> {
     pub base: Base<'d>,
     /// Whether only the likeliest sets are fitted once more, for want of time.
     pub only_fits: bool,
+    /// Whether it is of the simulation's parameters.
+    pub of_parameters: bool,
     /// For the user while it runs.
     pub doing: &'static str,
     /// For the user afterwards.
     pub note: String,
+}
+
+impl Lesson<'_> {
+    /// Whether only the steps change: the likeliest sets fitted with them tell whether the search was misled.
+    pub fn steps_only(&self) -> bool {
+        !self.of_parameters
+    }
+
+    /// For the user afterwards, where only the likeliest sets were fitted once more.
+    pub fn fitted_note(&self) -> String {
+        format!("the likeliest sets were fitted once more with {}", in_words(self.substeps))
+    }
+}
+
+/// So many integration steps in words.
+fn in_words(substeps: usize) -> String {
+    format!("{substeps} integration steps in each sampling period, which the likeliest effects need")
 }
 
 /// What the sets taught that were fitted so far, in this setting of a search that `setting` began with; `None` where the next search would be the
@@ -98,13 +117,9 @@ pub fn lesson<'d>(
         }
         return None;
     }
-    let steps = format!("{substeps} integration steps in each sampling period, which the likeliest effects need");
+    let steps = in_words(substeps);
     let parameters = "the first calibration had ended in a local minimum: beside an effect parameters were reached that fit better without it too, and the search was made once more from there";
     let (doing, note) = match (&better, finer) {
-        (None, _) if only_fits => (
-            "fitting the likeliest sets with shorter steps",
-            format!("the likeliest sets were fitted once more with {steps}"),
-        ),
         (None, _) => ("searching once more with shorter steps", format!("the search was made once more with {steps}")),
         (Some(_), false) => ("searching once more from better parameters", parameters.to_owned()),
         (Some(_), true) => {
@@ -115,7 +130,7 @@ pub fn lesson<'d>(
     let base = better.as_ref().unwrap_or(&none.base);
     let noise = (next.noise == judged.noise).then_some(&base.whitener);
     let base = next.further(base, noise, 2, 20)?;
-    Some(Lesson { substeps, base, only_fits, doing, note })
+    Some(Lesson { substeps, base, only_fits, of_parameters: better.is_some(), doing, note })
 }
 
 /// The simulation without effects, fitted from where its parameters are beside those of a set; `None` where that leaves a much larger plain error.

@@ -38,6 +38,22 @@ pub struct Explored<'a, 'd> {
 /// Searches that may be begun again.
 pub const LESSONS: usize = 2;
 
+/// Log evidence by which a set must lead over those that name other families for its lead to be clear.
+const CLEAR: f64 = 10.0;
+
+/// Whether no other families come near those of the best set, of sets by their families and evidence; sets of more effects say the same and more.
+fn leads_clearly(best: usize, sets: &[(Vec<&str>, f64)]) -> bool {
+    let (families, evidence) = &sets[best];
+    sets.iter().all(|(f, e)| f == families || f.len() > families.len() || *e <= evidence - CLEAR)
+}
+
+/// The families that the set which stands in a pool names, where it leads clearly.
+fn clear(pool: &[Hypothesis<'_>]) -> Option<Vec<&'static str>> {
+    let best = best_of(pool)?;
+    let sets: Vec<(Vec<&str>, f64)> = pool.iter().map(|h| (h.families(), h.log_evidence)).collect();
+    leads_clearly(best, &sets).then(|| pool[best].families())
+}
+
 /// Looks for what is missing around a calibrated simulation; where that teaches something of the simulation itself, once more, up to so many
 /// times.
 ///
@@ -142,12 +158,20 @@ pub fn explore<'a, 'd>(
         _ => (search, none),
     };
     let (search, none) = match learned(&search, &none, &pool, Done::Whole).filter(|_| significant) {
-        Some(lesson) if lesson.only_fits => {
-            (hooks.progress)(lesson.doing);
-            notes.push(lesson.note);
-            let finely = Search::new(Setting { substeps: lesson.substeps, ..search.setting.clone() }, options, hooks);
+        Some(lesson) if lesson.steps_only() => {
+            (hooks.progress)("fitting the likeliest sets with shorter steps");
+            let next = Setting { substeps: lesson.substeps, ..search.setting.clone() };
+            let finely = Search::new(next, options, hooks);
+            let note = lesson.fitted_note();
             let none = finely.setting.hypothesis(Vec::new(), lesson.base);
-            pool = finely.under_noise(&none, &pool);
+            let sets = finely.under_noise(&none, &pool);
+            // Where the matter is not as clear with shorter steps, their error may have misled the whole search.
+            let settled = clear(&pool).is_some_and(|families| clear(&sets).is_some_and(|now| now == families));
+            if !settled && !lesson.only_fits {
+                return again(Lesson { base: none.base, ..lesson });
+            }
+            notes.push(note);
+            pool = sets;
             (finely, none)
         }
         Some(lesson) => return again(lesson),
@@ -162,4 +186,24 @@ pub fn explore<'a, 'd>(
     }
     pool.insert(0, none);
     Ok(Explored { search, pool, candidates, significant, p_value, residual, detectable, least, notes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::leads_clearly;
+
+    #[test]
+    fn a_lead_is_clear_over_other_families_only() {
+        let pair = |evidence| (vec!["clearance", "dry_friction"], evidence);
+        let check = |others: &[(Vec<&'static str>, f64)], expected| {
+            let sets: Vec<(Vec<&str>, f64)> = std::iter::once(pair(300.0)).chain(others.iter().cloned()).collect();
+            assert_eq!(leads_clearly(0, &sets), expected, "{others:?}");
+        };
+        check(&[], true);
+        // Other members of the same families, and sets of more effects, are no other answer.
+        check(&[pair(299.0), (vec!["clearance", "dry_friction", "gravity"], 305.0)], true);
+        check(&[(vec!["clearance", "presliding"], 289.0), (vec!["presliding"], 100.0)], true);
+        check(&[(vec!["clearance", "presliding"], 295.0)], false);
+        check(&[(vec!["presliding"], 299.0)], false);
+    }
 }

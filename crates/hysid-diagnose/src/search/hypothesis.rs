@@ -54,6 +54,13 @@ impl Hypothesis<'_> {
         key.sort();
         key
     }
+
+    /// The families of its effects, sorted.
+    pub fn families(&self) -> Vec<&'static str> {
+        let mut all: Vec<&str> = self.effects.iter().map(|e| e.mechanism.family.name()).collect();
+        all.sort_unstable();
+        all
+    }
 }
 
 /// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest: log likelihood of the blocks, each row for

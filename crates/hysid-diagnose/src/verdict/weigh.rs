@@ -169,7 +169,7 @@ const NEAR: f64 = 12.0;
 /// one of the sensor of a linear plant are one statement; told twice, they would count twice against another family.
 fn wordings(pool: &[Hypothesis<'_>], winner: usize) -> Vec<usize> {
     let best = &pool[winner];
-    let families: Vec<Vec<&str>> = pool.iter().map(|h| sorted(h, |e| e.mechanism.family.name())).collect();
+    let families: Vec<Vec<&str>> = pool.iter().map(Hypothesis::families).collect();
     let layout = &best.base.model.data().layout;
     let same = |a: &Hypothesis<'_>, b: &Hypothesis<'_>| {
         let difference: Vec<f64> = a.base.fit.residual.iter().zip(&b.base.fit.residual).map(|(a, b)| a - b).collect();

@@ -27,7 +27,7 @@ pub static ASYMMETRIC_HYSTERESIS: Mechanism = Mechanism {
         )
     },
     contains: &["prandtl_ishlinskii", "backlash"],
-    confusable: &["prandtl_ishlinskii", "preisach", "input_polynomial"],
+    confusable: &["prandtl_ishlinskii", "preisach", "input_polynomial", "input_saturation"],
     needs: &[Need::Turns(12), Need::BothSides("u")],
     sentence: "The actuator {place} has a hysteresis loop with unequal sides: above {u_h} its gain changes by {a_h}.",
     signature: "An asymmetric major loop.",

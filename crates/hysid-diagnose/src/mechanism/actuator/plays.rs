@@ -72,11 +72,9 @@ impl Plays {
                 "u",
                 Grid::Reach("u", [0.8, 1.0, 1.2].map(|s| s / (SPACED + 1) as f64).to_vec()),
             ),
-            Purpose::Form(Form::Few | Form::Finer) => {
-                self.radii().iter().zip(1..).fold(law, |law, (share, i)| {
-                    weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
-                })
-            }
+            Purpose::Form(Form::Few | Form::Finer) => self.radii().iter().zip(1..).fold(law, |law, (share, i)| {
+                weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
+            }),
         };
         let weights: Vec<String> = self.terms().into_iter().map(|(weight, _)| weight).collect();
         law.report("share", "1", weights.join(" + "))
