@@ -50,6 +50,25 @@ pub fn calibration(stated: &[(f64, bool)]) -> (f64, Vec<Bin>) {
     (list.iter().map(|b| (b.0 - b.1).abs() * b.2 as f64 / total).sum(), list)
 }
 
+/// The calibration error to be expected of statements that are right as often as they say: so few of them differ by chance.
+pub fn calibration_by_chance(stated: &[(f64, bool)]) -> f64 {
+    let mut error = 0.0;
+    for bin in 0..10 {
+        let inside = stated.iter().map(|s| s.0).filter(|p| ((p * 10.0) as usize).min(9) == bin);
+        // The distribution of the number that are right, one statement after the other.
+        let (mut right, mut sum) = (vec![1.0], 0.0);
+        for p in inside {
+            sum += p;
+            right.push(0.0);
+            for k in (0..right.len()).rev() {
+                right[k] = right[k] * (1.0 - p) + if k > 0 { right[k - 1] * p } else { 0.0 };
+            }
+        }
+        error += right.iter().enumerate().map(|(k, q)| q * (k as f64 - sum).abs()).sum::<f64>();
+    }
+    error / stated.len().max(1) as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,5 +91,18 @@ mod tests {
         assert_eq!(quantile(&[1.0, f64::INFINITY], 0.0), 1.0);
         let (ece, bins) = calibration(&[(0.95, true), (0.95, false), (0.05, false)]);
         assert!((ece - (0.45 * 2.0 + 0.05) / 3.0).abs() < 1e-12 && bins.len() == 2);
+    }
+
+    #[test]
+    fn by_chance_few_statements_are_off_and_many_are_not() {
+        // One coin is off by a half; of two one of them half of the time by one, else not at all.
+        assert_eq!(calibration_by_chance(&[(0.5, true)]), 0.5);
+        assert_eq!(calibration_by_chance(&[(0.5, true), (0.5, false)]), 0.25);
+        // Mean absolute deviation of a binomial law for many: sqrt(2 p (1 - p) / (pi n)).
+        let many: Vec<(f64, bool)> = (0..2000).map(|i| ([0.25, 0.75][i % 2], true)).collect();
+        let expected = (2.0 * 0.25 * 0.75 / (std::f64::consts::PI * 1000.0)).sqrt();
+        assert!((calibration_by_chance(&many) - expected).abs() < 1e-3 * expected);
+        assert_eq!(calibration_by_chance(&[(1.0, true), (0.0, false)]), 0.0);
+        assert_eq!(calibration_by_chance(&[]), 0.0);
     }
 }

@@ -8,6 +8,9 @@ use super::projector::{Projector, dot, norm2};
 /// Below this the tail of the chi-square law is taken from its asymptotic series.
 const LEAST_TAIL: f64 = 1e-200;
 
+/// Share of a direction's power outside others below which what is left is rounding and curvature.
+const LEAST_LEFT: f64 = 1e-3;
+
 /// The response of one effect at one shape: whitened, projected, orthonormalised.
 #[derive(Debug, Clone)]
 pub struct FeatureGroup {
@@ -53,6 +56,19 @@ impl FeatureGroup {
             return None;
         }
         Some(Self { columns: projector.basis().to_vec(), concealment, factor, norm })
+    }
+
+    /// The directions of the group outside further ones, which are then no evidence for it; `None` where next to nothing is left.
+    pub fn outside(&self, others: &Projector) -> Option<Self> {
+        let mut left = Projector::default();
+        for column in &self.columns {
+            let mut rest = column.clone();
+            others.remove(&mut rest);
+            if norm2(&rest) > LEAST_LEFT {
+                left.push(rest);
+            }
+        }
+        (left.rank() > 0).then(|| Self { columns: left.basis().to_vec(), factor: Vec::new(), ..*self })
     }
 
     /// A group that is known by the norm of its first response only.
@@ -137,6 +153,19 @@ mod tests {
         let a = two.amplitudes(&[0.0, 2.0 * 3.0 - 1.0, 3.0 - 3.0, -0.5], 2);
         assert!((a[0] - 3.0).abs() < 1e-12 && (a[1] + 1.0).abs() < 1e-12, "{a:?}");
         assert!(FeatureGroup::new(&[vec![3.0, 0.0, 0.0, 0.0]], &layout, &w, &own).is_none());
+    }
+
+    #[test]
+    fn outside_others_a_group_explains_what_both_explain_less_what_the_others_do() {
+        let (layout, w) = plain(5);
+        let wave = |f: f64| -> Vec<f64> { (0..5).map(|i| (f * i as f64).cos()).collect() };
+        let group = FeatureGroup::new(&[wave(0.7), wave(1.9)], &layout, &w, &Projector::default()).unwrap();
+        let (drift, r) = (wave(0.2), wave(2.6));
+        let others = Projector::new([drift.clone()]);
+        let both = Projector::new([drift, wave(0.7), wave(1.9)]);
+        let rest = group.outside(&others).unwrap().explained(&r);
+        assert!((rest - (both.inside(&r) - others.inside(&r))).abs() < 1e-12 * norm2(&r));
+        assert!(group.outside(&Projector::new(group.columns.clone())).is_none());
     }
 
     #[test]

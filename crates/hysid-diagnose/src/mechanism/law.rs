@@ -29,12 +29,15 @@ pub enum Form {
     Finer,
     /// More terms, whose places are fitted too: six plays with a spacing of their own.
     Spaced,
+    /// A memory that is empty at the first sample: the current of a drive that is switched on.
+    Empty,
 }
 
 impl Purpose {
     /// What a law is fitted as, in the order in which the forms are tried.
-    pub const FITTED: [Self; 5] = [
+    pub const FITTED: [Self; 6] = [
         Self::Refit,
+        Self::Form(Form::Empty),
         Self::Form(Form::Smooth),
         Self::Form(Form::Few),
         Self::Form(Form::Finer),

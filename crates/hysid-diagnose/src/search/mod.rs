@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::error::DiagnoseError;
-use crate::evidence::{Contender, Projector, SurrogateTest, TestOptions, surrogate_test};
+use crate::evidence::{Contender, FeatureGroup, NoiseModel, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::mechanism::{Family, Mechanism, SLOW};
 use crate::model::base::{Base, NoiseKind};
 use crate::openset::{ODDS_AGAINST_MORE, OpenSet, correction};
@@ -253,18 +253,32 @@ impl<'a, 'd> Search<'a, 'd> {
         found
     }
 
-    /// The mismatch test over all candidates' kept columns. Where the noise has a colour, what slow noise does has a handicap.
-    pub fn test(&self, candidates: &[Candidate], base: &Base<'_>, evidence: &(Projector, Vec<f64>)) -> SurrogateTest {
-        let coloured = base.whitener.coefficients() > 0;
-        // A score is twice a gain in log likelihood.
-        let handicap = |c: &Candidate| if coloured && c.mechanism.family.is_slow_noise() { 2.0 * SLOW } else { 0.0 };
-        let groups: Vec<Contender<'_>> = candidates
-            .iter()
-            .flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref()).map(move |group| (c, group)))
-            .map(|(c, group)| Contender { group, handicap: handicap(c) })
-            .collect();
+    /// The mismatch test over all candidates' kept columns. Where the noise has a colour, what slow noise does has a handicap; where nobody knows
+    /// how it goes on below the lowest line, it is no evidence for any effect: what a drift would explain is taken for noise.
+    pub fn test(&self, candidates: &[Candidate], base: &Base<'_>, (own, r): &(Projector, Vec<f64>)) -> SurrogateTest {
+        let groups_of = |slow: bool| {
+            let some = candidates.iter().filter(move |c| c.mechanism.family.is_slow_noise() == slow);
+            some.flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref()))
+        };
+        let layout = &base.model.data().layout;
         let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed };
-        surrogate_test(&groups, &base.model.data().layout, &evidence.0, &evidence.1, options)
+        if !base.whitener.models.iter().all(NoiseModel::is_known_below) {
+            let drifts = Projector::new(groups_of(true).flat_map(|g| g.columns.iter().cloned()));
+            let rest: Vec<FeatureGroup> = groups_of(false).filter_map(|g| g.outside(&drifts)).collect();
+            let groups: Vec<Contender<'_>> = rest.iter().map(|group| Contender { group, handicap: 0.0 }).collect();
+            let (mut own, mut r) = (own.clone(), r.clone());
+            drifts.remove(&mut r);
+            drifts.basis().iter().for_each(|q| {
+                own.push(q.clone());
+            });
+            return surrogate_test(&groups, layout, &own, &r, options);
+        }
+        // A score is twice a gain in log likelihood.
+        let handicap = if base.whitener.coefficients() > 0 { 2.0 * SLOW } else { 0.0 };
+        let quick = groups_of(false).map(|group| Contender { group, handicap: 0.0 });
+        let groups: Vec<Contender<'_>> =
+            quick.chain(groups_of(true).map(|group| Contender { group, handicap })).collect();
+        surrogate_test(&groups, layout, own, r, options)
     }
 }
 

@@ -83,6 +83,11 @@ pub(super) fn plain(what: &str, target: &str, value: f64, n: usize, limit: f64) 
     }
 }
 
+/// A figure without a target, beside which another is read.
+pub(super) fn beside(what: &str, value: f64, n: usize) -> Line {
+    Line { standing: Standing::Open, ..plain(what, "-", value, n, f64::INFINITY) }
+}
+
 pub(super) fn told(what: &str, hits: usize, n: usize) -> Line {
     let mut line = share(what, "-", hits, n, 0.0, false, false);
     line.standing = Standing::Open;

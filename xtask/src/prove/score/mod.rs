@@ -18,13 +18,13 @@ use hysid_concealed::case::Group;
 use hysid_concealed::noise::Noise;
 
 use self::breakdown::{cell, competitors, confusion};
-use self::line::{figure, plain, share, told};
+use self::line::{beside, figure, plain, share, told};
 use self::numbers::jump;
 pub use self::numbers::shared;
 use self::row::over_oracle;
 use self::statements::firm_and_wrong;
 use super::experiment::Settled;
-use super::stats::{Bin, calibration};
+use super::stats::{Bin, calibration, calibration_by_chance};
 use super::verdict::Verdict;
 
 /// The whole score.
@@ -166,6 +166,8 @@ pub fn score(rows: &[Row]) -> Score {
     let pairs_of: Vec<(f64, bool)> = statements.iter().map(|s| (s.probability, s.right)).collect();
     let (ece, bins) = calibration(&pairs_of);
     lines.push(plain("Expected calibration error (mechanisms)", "<= 0.05", ece, pairs_of.len(), 0.05));
+    let chance = calibration_by_chance(&pairs_of);
+    lines.push(beside("- of as many that are right as often as they say, by chance", chance, pairs_of.len()));
 
     let seen = of(&|r| r.label.group != Group::Control && r.information() >= 100.0);
     lines.push(share("Detected, N DNR^2 >= 100", ">= 95 %", count(&seen, &alarmed), seen.len(), 0.95, false, false));

@@ -41,7 +41,7 @@ impl Plays {
     /// What each play weighs, and its half-width.
     fn terms(self) -> Vec<(String, String)> {
         match self.0 {
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth) => {
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Empty) => {
                 density().map(|(share, radius)| (format!("p*{share}"), radius)).collect()
             }
             Purpose::Form(Form::Spaced) => (1..=SPACED).map(|i| (format!("p_{i}"), format!("{i}*r_s"))).collect(),
@@ -63,7 +63,7 @@ impl Plays {
         let law = Law::replace(text);
         let weight = |law: Law, i: usize| law.amplitude(format!("p_{i}"), "1", -0.2, 1.0);
         let law = match self.0 {
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth) => law
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Empty) => law
                 .amplitude("p", "1", -0.2, 5.0)
                 .shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0]))
                 .constant("r_w", "u", Grid::Reach("u", vec![1.0 / CELLS as f64])),
@@ -113,7 +113,9 @@ mod tests {
         match purpose {
             Purpose::Form(Form::Few) => six[..3].to_vec(),
             Purpose::Form(Form::Finer) => six.to_vec(),
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth) => vec![("p", 0.4), ("r_d", 4.0)],
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Empty) => {
+                vec![("p", 0.4), ("r_d", 4.0)]
+            }
             Purpose::Form(Form::Spaced) => six.into_iter().chain([("r_s", 1.3)]).collect(),
         }
     }

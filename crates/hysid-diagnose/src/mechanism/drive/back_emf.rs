@@ -1,8 +1,16 @@
 //! The electrical side of a drive: induced voltage and inductance.
 
-use crate::mechanism::path::{FASTEST, SHORTEST};
+use crate::mechanism::path::{FASTEST, SHORTEST, emptiness, with_duration};
 use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
+
+/// A law with the winding's parameters, however short its time constant.
+fn wound(law: Law) -> Law {
+    law.amplitude("k_e", "u/v", 0.0, 5.0)
+        .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
+        .within(SHORTEST, 2000.0)
+        .never_baseline()
+}
 
 /// The electrical side of a drive: induced voltage and inductance.
 pub static BACK_EMF: Mechanism = Mechanism {
@@ -26,11 +34,11 @@ pub static BACK_EMF: Mechanism = Mechanism {
             .state("u_e", "u", "(u - k_e*v - u_e)/tau_e")
             .starting_free()
             .never_baseline(),
-        Purpose::Refit | Purpose::Form(_) => Law::replace("lag(u - k_e*v, tau_e)")
-            .amplitude("k_e", "u/v", 0.0, 5.0)
-            .shape("tau_e", "h", log_grid(0.5, 50.0, 4))
-            .within(SHORTEST, 2000.0)
-            .never_baseline(),
+        // The same within a sampling period, where a state of its own would need shorter steps.
+        Purpose::Form(Form::Empty) => {
+            wound(with_duration(Law::replace(format!("lag(u - k_e*v, tau_e) - {}", emptiness("u", "tau_e")))))
+        }
+        Purpose::Refit | Purpose::Form(_) => wound(Law::replace("lag(u - k_e*v, tau_e)")),
     },
     contains: &["actuator_lag"],
     confusable: &["actuator_lag", "delay"],
