@@ -35,11 +35,16 @@ pub fn quantile_interval(values: &[f64], q: f64) -> (f64, f64) {
 /// One bin of a reliability diagram: mean stated probability, share right, count.
 pub type Bin = (f64, f64, usize);
 
+/// The one of ten equal bins in which a probability lies.
+fn bin_of(p: f64) -> usize {
+    ((p * 10.0) as usize).min(9)
+}
+
 /// Expected calibration error over ten equal bins, and the bins that hold anything.
 pub fn calibration(stated: &[(f64, bool)]) -> (f64, Vec<Bin>) {
     let mut bins = vec![(0.0, 0usize, 0usize); 10];
     for &(p, right) in stated {
-        let bin = &mut bins[((p * 10.0) as usize).min(9)];
+        let bin = &mut bins[bin_of(p)];
         bin.0 += p;
         bin.1 += usize::from(right);
         bin.2 += 1;
@@ -54,7 +59,7 @@ pub fn calibration(stated: &[(f64, bool)]) -> (f64, Vec<Bin>) {
 pub fn calibration_by_chance(stated: &[(f64, bool)]) -> f64 {
     let mut error = 0.0;
     for bin in 0..10 {
-        let inside = stated.iter().map(|s| s.0).filter(|p| ((p * 10.0) as usize).min(9) == bin);
+        let inside = stated.iter().map(|s| s.0).filter(|p| bin_of(*p) == bin);
         // The distribution of the number that are right, one statement after the other.
         let (mut right, mut sum) = (vec![1.0], 0.0);
         for p in inside {

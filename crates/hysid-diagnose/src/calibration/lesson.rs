@@ -50,8 +50,8 @@ pub struct Lesson<'d> {
     pub base: Base<'d>,
     /// Whether only the likeliest sets are fitted once more, for want of time.
     pub only_fits: bool,
-    /// Whether it is of the simulation's parameters.
-    pub of_parameters: bool,
+    /// Whether only the steps change: the likeliest sets fitted with them tell whether the search was misled.
+    pub steps_only: bool,
     /// For the user while it runs.
     pub doing: &'static str,
     /// For the user afterwards.
@@ -59,11 +59,6 @@ pub struct Lesson<'d> {
 }
 
 impl Lesson<'_> {
-    /// Whether only the steps change: the likeliest sets fitted with them tell whether the search was misled.
-    pub fn steps_only(&self) -> bool {
-        !self.of_parameters
-    }
-
     /// For the user afterwards, where only the likeliest sets were fitted once more.
     pub fn fitted_note(&self) -> String {
         format!("the likeliest sets were fitted once more with {}", in_words(self.substeps))
@@ -130,7 +125,7 @@ pub fn lesson<'d>(
     let base = better.as_ref().unwrap_or(&none.base);
     let noise = (next.noise == judged.noise).then_some(&base.whitener);
     let base = next.further(base, noise, 2, 20)?;
-    Some(Lesson { substeps, base, only_fits, of_parameters: better.is_some(), doing, note })
+    Some(Lesson { substeps, base, only_fits, steps_only: better.is_none(), doing, note })
 }
 
 /// The simulation without effects, fitted from where its parameters are beside those of a set; `None` where that leaves a much larger plain error.

@@ -158,19 +158,20 @@ pub fn explore<'a, 'd>(
         _ => (search, none),
     };
     let (search, none) = match learned(&search, &none, &pool, Done::Whole).filter(|_| significant) {
-        Some(lesson) if lesson.steps_only() => {
+        Some(lesson) if lesson.steps_only => {
             (hooks.progress)("fitting the likeliest sets with shorter steps");
             let next = Setting { substeps: lesson.substeps, ..search.setting.clone() };
             let finely = Search::new(next, options, hooks);
-            let note = lesson.fitted_note();
-            let none = finely.setting.hypothesis(Vec::new(), lesson.base);
+            // The next search begins under the first noise model; here everything is judged under the one that decided.
+            let Some(base) = finely.setting.further(&lesson.base, None, 2, 20) else { return again(lesson) };
+            let none = finely.setting.hypothesis(Vec::new(), base);
             let sets = finely.under_noise(&none, &pool);
             // Where the matter is not as clear with shorter steps, their error may have misled the whole search.
             let settled = clear(&pool).is_some_and(|families| clear(&sets).is_some_and(|now| now == families));
             if !settled && !lesson.only_fits {
-                return again(Lesson { base: none.base, ..lesson });
+                return again(lesson);
             }
-            notes.push(note);
+            notes.push(lesson.fitted_note());
             pool = sets;
             (finely, none)
         }

@@ -144,19 +144,14 @@ pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
     places.iter().filter_map(|n| base.model.place_of(n)).any(|place| base.fit.at_bound[place])
 }
 
-/// What a set says of each of its effects, in an order of its own.
-fn sorted<'h, T: Ord>(h: &'h Hypothesis<'_>, of: impl Fn(&'h Effect) -> T) -> Vec<T> {
-    let mut all: Vec<T> = h.effects.iter().map(of).collect();
-    all.sort_unstable();
-    all
-}
-
 /// Whether two sets say the same of families and slots and differ in members only.
 fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
-    fn kind(e: &Effect) -> (&str, &str) {
-        (e.mechanism.family.name(), &e.slot.label)
+    fn kinds<'h>(h: &'h Hypothesis<'_>) -> Vec<(&'h str, &'h str)> {
+        let mut all: Vec<_> = h.effects.iter().map(|e| (e.mechanism.family.name(), e.slot.label.as_str())).collect();
+        all.sort_unstable();
+        all
     }
-    sorted(a, kind) == sorted(b, kind)
+    kinds(a) == kinds(b)
 }
 
 /// Squared difference of two predictions, in units of the noise, and difference of their log evidence, below which no recording of this length
