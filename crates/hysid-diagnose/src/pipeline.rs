@@ -8,6 +8,7 @@ use crate::answer::picture::Picture;
 use crate::answer::records::*;
 use crate::answer::text::number;
 use crate::calibration::fair::calibrate;
+use crate::data::glitches::mended;
 use crate::data::intake::{Intake, intake};
 use crate::error::DiagnoseError;
 use crate::experiment::fresh::gamble;
@@ -17,7 +18,7 @@ use crate::model::base::NoiseKind;
 use crate::model::force::pushed;
 use crate::model::hold::free_run;
 use crate::openset::left::Left;
-use crate::openset::uneven;
+use crate::openset::{uneven, wanders};
 use crate::request::{Hooks, Request};
 use crate::search::budget::{Budget, Step};
 use crate::search::explore::{Explored, LESSONS, explore};
@@ -63,12 +64,12 @@ fn veto(best: &Hypothesis<'_>, least: &Hypothesis<'_>, worse_on_blocks: bool) ->
 pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, DiagnoseError> {
     let options = request.options;
     let simulation = request.simulation;
-    let Intake { data, held, notes } = intake(request, hooks)?;
+    let Intake { data: recorded, held, mut notes } = intake(request, hooks)?;
 
     (hooks.progress)("calibrating the simulation");
     let budget = Budget::new(hooks.expired);
     let mut setting = Setting {
-        data: &data,
+        data: &recorded,
         original: simulation.clone(),
         pushed: pushed(simulation),
         substeps: 2,
@@ -77,7 +78,14 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         noise: NoiseKind::Coloured,
         budget: &budget,
     };
-    let base = calibrate(&mut setting, request)?;
+    let mut base = calibrate(&mut setting, request)?;
+    let mended = mended(simulation, &recorded, &base.fit.residual);
+    if let Some(data) = &mended {
+        notes.extend_from_slice(&data.notes[recorded.notes.len()..]);
+        setting.data = data;
+        base = calibrate(&mut setting, request)?;
+    }
+    let data = setting.data;
     (hooks.accepted)();
     setting.own_unknowns = base.model.count();
     let found = explore(&setting, base, request, hooks, LESSONS)?;
@@ -124,6 +132,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     };
     for (s, u) in support.iter_mut().zip(&uneven) {
         s.discount(u.map_or(0.0, |u| u.probability));
+    }
+    // Nor is a parameter that changes once told from one that wanders by its name alone.
+    let wandering = wanders(search, &pool, winner);
+    for (s, w) in support.iter_mut().zip(&wandering) {
+        s.discount(w.as_ref().map_or(0.0, |w| w.probability));
     }
     // On four turns a play and a sum of plays are one law: what a law needs to be told from its neighbours it needs to be told firmly.
     let lacking = lacking(&pool[winner], &candidates);
@@ -218,6 +231,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         .filter_map(|((e, u), told)| u.as_ref()?.beside(told.support, told.probability).words(e))
         .collect();
     file.notes.extend(unequal.iter().map(|words| format!("{words}: the catalogue has no such law")));
+    file.notes.extend(best.effects.iter().zip(&wandering).filter_map(|(e, w)| w.as_ref()?.in_place_of(e)));
 
     (hooks.progress)("scoring on the hold-out");
     let augmented = written.map(|h| h.base.document());

@@ -145,6 +145,21 @@ fn dry_friction_is_named_with_its_size_and_the_hold_out_improves() {
     assert_eq!(again.file.verdict, VerdictKind::NoSignificantMismatch, "{text} {:?}", again.file.effects);
 }
 
+/// Five samples that are wrong by three times the motion would bend the calibration and hide the friction.
+#[test]
+fn glitches_of_the_sensor_hide_nothing() {
+    let friction = |_: f64, v: f64| 1.5 * (v / 5e-4).tanh();
+    let clean = recording("est.csv", 1, 900, friction);
+    let mut channels = clean.channels().to_vec();
+    let size = 3.0 * rms(&channels[1].samples);
+    [31, 222, 413, 604, 795].into_iter().for_each(|n: usize| channels[1].samples[n] += size);
+    let bad = Recording::new("est.csv", clean.clock(), channels).unwrap();
+    let d = run(BASELINE, &[bad], &[recording("val.csv", 2, 900, friction)]).unwrap();
+    assert_eq!(d.file.effects.first().map(|e| e.family.as_str()), Some("dry_friction"), "{}", d.file.summary);
+    assert!(d.file.fit[0].ratio.unwrap() < 0.5, "{:?}", d.file.fit);
+    assert!(d.file.notes.iter().any(|n| n.starts_with("5 samples stand out")), "{:?}", d.file.notes);
+}
+
 #[test]
 fn a_hum_is_found_although_a_noise_model_would_swallow_it() {
     let with_hum = |name: &str, seed: u64| {

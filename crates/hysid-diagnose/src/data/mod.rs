@@ -4,6 +4,7 @@
 //! its own initial state. Rows are ordered by stretch, then output, then time.
 
 mod cut;
+pub mod glitches;
 pub mod intake;
 pub mod plant;
 mod thinning;
@@ -198,6 +199,16 @@ impl DataSet {
             }
         }
         out
+    }
+
+    /// Moves a measured row of a series, and the sample that it is.
+    fn move_row(&mut self, series: &Series, n: usize, by: f64) {
+        self.y[series.rows.start + n] += by;
+        if self.step == 1 {
+            let stretch = &mut self.stretches[series.stretch];
+            stretch.outputs[series.output][series.first + n] += by;
+            Arc::make_mut(&mut stretch.recorded)[series.output][series.first + n] += by;
+        }
     }
 
     /// The same inputs with other measured outputs (in the order of the rows).

@@ -21,6 +21,9 @@ const BY_CHANCE: f64 = 0.05;
 /// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
 const AS_MUCH: f64 = 0.5;
 const FAR_MORE: f64 = 5.0;
+/// Share of a set's evidence from which generic terms, on the tangent, are worth a fit in its place. Where the mismatch is large the tangent shows but a
+/// part of what a term explains once it stands in the equations.
+const WORTH_A_FIT: f64 = 0.25;
 
 /// What is left of a set's residual.
 pub struct Left<'d> {
@@ -30,8 +33,10 @@ pub struct Left<'d> {
     open: Option<OpenSet>,
     /// The same in place of the set, where that explains far more.
     instead: Option<OpenSet>,
-    /// What the set leaves in its place, refitted, where that explains far more.
-    swapped: Option<Refitted<'d>>,
+    /// Generic terms in its place, refitted, where those explain far more, with what the tangent said of them.
+    swapped: Option<(Refitted<'d>, OpenSet)>,
+    /// The terms that are written into the simulation, and where they act.
+    written: Option<(String, Vec<TermRecord>)>,
     /// Whether generic terms explain so much that the set is an imitation.
     pub foreign: bool,
     /// Whether the set is a sum of relaxations, which stands for a memory with many time scales.
@@ -55,14 +60,7 @@ impl<'d> Left<'d> {
         let generic = if winner > 0 { search.open(none) } else { None };
         let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
         let outdone = generic.as_ref().is_some_and(outdone);
-        // Where the set is an imitation, what it leaves is a small part of what is really missing: the right term shows beside the wrong effects.
-        // The regression, which knows the simulation without effects only by its tangent, may choose another one there.
-        let swapped = seen.filter(|_| winner > 0 && !outdone).and_then(|o| {
-            let Writable::Sparse(terms) = o.writable.as_ref()? else { return None };
-            let alone = Writable::Sparse(terms.within(none.base.document()));
-            let swapped = fitted(&search.setting, none, &alone)?;
-            (swapped.hypothesis.log_evidence > best.log_evidence + o.choice + FAR_MORE).then_some(swapped)
-        });
+        let swapped = if winner > 0 && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { None };
         let outdone = outdone || swapped.is_some();
         let foreign = winner > 0 && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
         // What was not looked at is not known to be nothing.
@@ -71,7 +69,7 @@ impl<'d> Left<'d> {
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
         let instead = generic.filter(|g| spectrum || (outdone && swapped.is_none() && g.gain > both));
-        Self { test, open, instead, swapped, foreign, spectrum, imperfect, alpha }
+        Self { test, open, instead, swapped, written: None, foreign, spectrum, imperfect, alpha }
     }
 
     /// As it is reported; `None` where it was not looked at.
@@ -107,45 +105,35 @@ impl<'d> Left<'d> {
             return None;
         }
         let setting = &search.setting;
-        let swapped = self.take_swapped();
+        let swapped = self.swapped.take();
         let replaced = swapped.is_some();
         let refitted = |(i, open): (usize, Option<&OpenSet>)| {
             let (parent, open) = (&pool[i], open?);
-            Some((fitted(setting, parent, open.writable.as_ref()?)?.hypothesis, self.stands_by_evidence(open)))
+            Some((fitted(setting, parent, open.writable.as_ref()?)?, open.clone(), self.stands_by_evidence(open)))
         };
-        let best = match swapped {
-            Some(h) => Some((h, true)),
+        let (Refitted { hypothesis: best, terms }, of, sure) = match swapped {
+            Some((refitted, of)) => (refitted, of, true),
             None => {
                 let instead = if winner > 0 { search.open(&pool[0]) } else { None };
                 [(winner, self.open.as_ref()), (0, instead.as_ref())]
                     .into_iter()
                     .filter_map(refitted)
-                    .max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))
+                    .max_by(|a, b| a.0.hypothesis.log_evidence.total_cmp(&b.0.hypothesis.log_evidence))?
             }
-        }?;
-        let (best, sure) = best;
+        };
         let (_, before) = block_score(setting, &pool[otherwise])?;
         let (_, after) = block_score(setting, &best)?;
         let ratio = (after.iter().sum::<f64>() / before.iter().sum::<f64>()).sqrt();
         let better = ratio < 1.0;
-        if let Some(open) = self.open.as_mut().filter(|_| replaced) {
-            (open.gain, open.block_ratio) = (best.log_evidence - pool[0].log_evidence - open.choice, ratio);
+        let slot = of.record.slot.clone();
+        if replaced {
+            // What stands in the set's place is told.
+            let gain = best.log_evidence - pool[0].log_evidence - of.choice;
+            self.instead = Some(OpenSet { gain, block_ratio: ratio, ..of });
         }
-        ((sure && better) || better_by_chance(&before, &after)? < BY_CHANCE).then_some(best)
-    }
-
-    /// The simulation with what stands in the set's place; its terms are told from now on.
-    fn take_swapped(&mut self) -> Option<Hypothesis<'d>> {
-        let Refitted { hypothesis, terms } = self.swapped.take()?;
-        if let Some(open) = &mut self.open {
-            let told = std::mem::take(&mut open.record.terms);
-            let with = |t: TermRecord| {
-                let (_, coefficient) = terms.iter().find(|(text, _)| *text == t.term)?;
-                Some(TermRecord { coefficient: *coefficient, ..t })
-            };
-            open.record.terms = told.into_iter().filter_map(with).collect();
-        }
-        Some(hypothesis)
+        let stands = (sure && better) || better_by_chance(&before, &after)? < BY_CHANCE;
+        self.written = (stands && !terms.is_empty()).then_some((slot, terms));
+        stands.then_some(best)
     }
 
     /// The correction that is told: in place of the set, or of what it leaves.
@@ -168,8 +156,40 @@ impl<'d> Left<'d> {
     pub fn believed(self) -> Option<(CorrectionRecord, Option<String>)> {
         let wanted = self.imperfect || self.test.is_none();
         let open = self.told().filter(|o| wanted && self.stands(o))?;
-        Some((CorrectionRecord { ratio: finite(open.block_ratio), ..open.record.clone() }, open.words.clone()))
+        let mut record = CorrectionRecord { ratio: finite(open.block_ratio), ..open.record.clone() };
+        let words = open.words.clone();
+        // What is written is told as it is written.
+        if let Some((slot, terms)) = self.written {
+            (record.slot, record.terms) = (slot, terms);
+        }
+        Some((record, words))
     }
+}
+
+/// Generic terms, refitted in the place of a set, that explain far more, with what the tangent said of them: those that the set leaves (`seen`) and
+/// those of the simulation without effects.
+///
+/// Where the set is an imitation, what it leaves is a small part of what is really missing: the right term shows beside the wrong effects. The regression,
+/// which knows the simulation without effects only by its tangent, may choose another one there.
+fn in_place<'d>(
+    search: &Search<'_, 'd>,
+    none: &Hypothesis<'d>,
+    best: &Hypothesis<'d>,
+    seen: Option<&OpenSet>,
+    generic: Option<&OpenSet>,
+) -> Option<(Refitted<'d>, OpenSet)> {
+    let explained = best.log_evidence - none.log_evidence;
+    let likely =
+        |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
+    let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - best.log_evidence - o.choice;
+    seen.into_iter()
+        .chain(generic.filter(likely))
+        .filter_map(|o| {
+            let terms = Writable::Sparse(o.sparse()?.within(none.base.document()));
+            Some((fitted(&search.setting, none, &terms)?, o.clone()))
+        })
+        .filter(|swapped| lead(swapped) > FAR_MORE)
+        .max_by(|a, b| lead(a).total_cmp(&lead(b)))
 }
 
 /// The noise that the best model leaves, by output.

@@ -14,10 +14,13 @@ pub mod left;
 mod modulation;
 mod needed;
 mod regress;
+mod shapes;
 mod signature;
 mod terms;
 mod uneven;
 mod varying;
+mod view;
+mod wanders;
 mod written;
 
 use hysid_linalg::Matrix;
@@ -34,6 +37,7 @@ use signature::signature;
 use terms::{Kind, Term, terms};
 pub use uneven::uneven;
 use varying::{Varying, varying};
+pub use wanders::wanders;
 use written::{Sparse, with_oscillation};
 
 /// A correction with what decides whether it is believed.
@@ -47,8 +51,8 @@ pub struct OpenSet {
     pub gain: f64,
     /// What of it is paid for the choice.
     pub choice: f64,
-    /// The fitted simulation with the correction in it, not yet refitted; `None` where a parameter walks, or where a term is a function of the time
-    /// in this recording beside others that are not: such a term mends what the others miss, and says nothing of another recording.
+    /// The fitted simulation with the correction in it, not yet refitted, without terms that are functions of the time beside others that are not;
+    /// `None` where a parameter walks.
     pub writable: Option<Writable>,
     /// What it says in words, where it says more than that something is missing.
     pub words: Option<String>,
@@ -64,6 +68,14 @@ impl OpenSet {
     /// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
     pub fn by_chance(&self, odds_against: f64) -> f64 {
         if self.block_ratio < 1.0 { (odds_against * (-self.gain).exp()).min(1.0) } else { 1.0 }
+    }
+
+    /// Its terms, where it is made of such.
+    fn sparse(&self) -> Option<&Sparse> {
+        match &self.writable {
+            Some(Writable::Sparse(terms)) => Some(terms),
+            _ => None,
+        }
     }
 }
 
@@ -96,11 +108,7 @@ struct Chosen {
 /// The correction of what is left of a fitted simulation's residual: sparse terms or a parameter that varies, whichever has more evidence; `None`
 /// where there is neither.
 pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
-    let layout = &base.model.data().layout;
-    let mut noises = vec![base.whitener.clone()];
-    if kind == NoiseKind::Coloured && base.coloured() {
-        noises.push(layout.fit_noise(&base.fit.residual, 0, &[]));
-    }
+    let noises = noises(base, kind);
     let terms = terms(base);
     let sparse =
         noises.iter().filter_map(|noise| choose(base, kind, &terms, noise)).max_by(|a, b| a.gain.total_cmp(&b.gain));
@@ -110,6 +118,16 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
         (Some(sparse), _) => Some(of_terms(base, &terms, sparse)),
         (None, None) => None,
     }
+}
+
+/// The noise models under which a correction is looked for: the fit's own, and plain squares where that is coloured and may have taken mismatch for
+/// noise.
+fn noises(base: &Base<'_>, kind: NoiseKind) -> Vec<Whitener> {
+    let mut noises = vec![base.whitener.clone()];
+    if kind == NoiseKind::Coloured && base.coloured() {
+        noises.push(base.model.data().layout.fit_noise(&base.fit.residual, 0, &[]));
+    }
+    noises
 }
 
 /// Rms error on blocks that the coefficients of these columns were not fitted to, over that without them, whitened by the noise that they leave.
@@ -137,19 +155,24 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
         .collect();
     let slot = terms[best.terms[0]].slot.clone();
     let signature = signature(base, terms, &best.left, &best.terms, &best.coefficients);
-    let timed = best.terms.iter().filter(|&&i| terms[i].kind == Kind::Time).count();
-    let with_coefficients = || {
-        let bare = |i: usize| Term { column: Vec::new(), ..terms[i].clone() };
-        best.terms.iter().map(move |&i| bare(i)).zip(best.coefficients.iter().copied())
+    // A term that is a function of the time in this recording, beside others that are not, mends what those leave of the mismatch on the tangent, and
+    // says nothing of another recording.
+    let lasting: Vec<usize> = best.terms.iter().copied().filter(|&i| terms[i].kind != Kind::Time).collect();
+    let (kept, coefficients) = if lasting.is_empty() || lasting.len() == best.terms.len() {
+        (best.terms.clone(), best.coefficients.clone())
+    } else {
+        let picked: Vec<&[f64]> = lasting.iter().map(|&i| terms[i].column.as_slice()).collect();
+        let (coefficients, _) = regress(base, &picked, &best.left, None, 0.0);
+        (lasting, coefficients)
     };
-    let whole = timed == 0 || timed == best.terms.len();
-    let writable = whole.then(|| Writable::Sparse(Sparse::new(base.document(), with_coefficients())));
+    let bare = |i: usize| Term { column: Vec::new(), ..terms[i].clone() };
+    let sparse = Sparse::new(base.document(), kept.iter().map(|&i| bare(i)).zip(coefficients));
     OpenSet {
         record: CorrectionRecord { slot, terms: records, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &best.left, 0.0),
         gain: best.gain,
         choice: best.choice,
-        writable,
+        writable: Some(Writable::Sparse(sparse)),
         words: None,
     }
 }

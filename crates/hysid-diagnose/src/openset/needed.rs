@@ -1,12 +1,16 @@
 //! A correction refitted in the equations, and which of its terms are needed there.
 //!
 //! Regression chooses terms on the tangent of the simulation as it is. Where the mismatch is large the tangent is only near, and further terms mend what one
-//! that is right leaves of it; once that stands in the equations and is refitted they mend nothing, and on another recording they harm.
+//! that is right leaves of it; once that stands in the equations and is refitted they mend nothing, and on another recording they harm. Terms that are
+//! missing show around it then.
 
 use hysid_plant::Simulation;
 
-use super::Writable;
 use super::written::Sparse;
+use super::{Writable, correction};
+use crate::answer::file::TermRecord;
+use crate::evidence::{dot, norm2};
+use crate::model::Values;
 use crate::model::base::Base;
 use crate::search::budget::Step;
 use crate::search::hypothesis::{Hypothesis, Setting};
@@ -15,57 +19,112 @@ use crate::search::hypothesis::{Hypothesis, Setting};
 pub struct Refitted<'d> {
     /// The simulation with it.
     pub hypothesis: Hypothesis<'d>,
-    /// The terms that it needs there, with their coefficients; none for a parameter that oscillates.
-    pub terms: Vec<(String, f64)>,
+    /// The terms that it needs there, as they were fitted; none for a parameter that oscillates.
+    pub terms: Vec<TermRecord>,
+}
+
+/// Times that terms are looked for around a correction that was refitted.
+const MORE: usize = 3;
+
+/// A sparse correction as it was fitted: its terms, the names of their parameters, the fit.
+struct Fit<'d> {
+    sparse: Sparse,
+    names: Vec<Vec<String>>,
+    hypothesis: Hypothesis<'d>,
 }
 
 /// The correction fitted in the place of, or on top of, a set, without the terms that it does not need.
 pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable) -> Option<Refitted<'d>> {
-    let fit = |simulation: &Simulation| {
-        let (from, noise) = (parent.base.values(), Some(&parent.base.whitener));
-        let base = setting.fit(simulation, &from, noise, 2, setting.iterations)?;
-        Some(setting.hypothesis(parent.effects.clone(), base))
-    };
-    let mut sparse = match writable {
+    let sparse = match writable {
         Writable::Oscillation(simulation) => {
-            return Some(Refitted { hypothesis: fit(simulation)?, terms: Vec::new() });
+            let hypothesis = fit(setting, parent, &parent.base.values(), simulation)?;
+            return Some(Refitted { hypothesis, terms: Vec::new() });
         }
         Writable::Sparse(sparse) => sparse.clone(),
     };
-    let (simulation, mut names) = sparse.written()?;
-    let mut best = fit(&simulation)?;
-    while let Some((fewer, its_names, h)) = without_the_weakest(setting, &sparse, &names, &best, &fit) {
-        if h.log_evidence < best.log_evidence {
-            break;
-        }
-        (sparse, names, best) = (fewer, its_names, h);
+    let mut best = pruned(setting, parent, sparse, &parent.base.values())?;
+    for _ in 0..MORE {
+        let Some(longer) = with_more(setting, parent, &best) else { break };
+        best = longer;
     }
-    let values = best.base.values().parameters;
-    let coefficient = |names: &Vec<String>| names.first().and_then(|n| values.get(n)).copied().unwrap_or(0.0);
-    let terms = sparse.texts().map(str::to_owned).zip(names.iter().map(coefficient)).collect();
-    Some(Refitted { hypothesis: best, terms })
+    let terms = told(parent, &best)?;
+    Some(Refitted { hypothesis: best.hypothesis, terms })
 }
 
-/// The correction without the term whose coefficient is the smallest beside its standard error.
-fn without_the_weakest<'d>(
+/// The terms of a correction as they were fitted, each with the share of the residual's power, before any of them, that it explains.
+fn told(parent: &Hypothesis<'_>, best: &Fit<'_>) -> Option<Vec<TermRecord>> {
+    let base = &best.hypothesis.base;
+    let white = |x: &[f64]| base.whitener.apply(&base.model.data().layout, x);
+    let r = white(&parent.base.fit.residual);
+    let fitted = fitted_values(best)?;
+    let of = |((text, values), names): ((String, &Vec<f64>), &Vec<String>)| {
+        let (name, coefficient) = (names.first()?, *values.first()?);
+        let column = white(base.fit.jacobian.get(base.model.place_of(name)?)?);
+        Some(TermRecord {
+            term: text,
+            coefficient,
+            err: coefficient * dot(&column, &r) / norm2(&r).max(f64::MIN_POSITIVE),
+        })
+    };
+    best.sparse.texts(&fitted).zip(&fitted).zip(&best.names).map(of).collect()
+}
+
+/// A simulation with terms in it, fitted from these values.
+fn fit<'d>(
     setting: &Setting<'d>,
-    sparse: &Sparse,
-    names: &[Vec<String>],
-    h: &Hypothesis<'d>,
-    fit: &dyn Fn(&Simulation) -> Option<Hypothesis<'d>>,
-) -> Option<(Sparse, Vec<Vec<String>>, Hypothesis<'d>)> {
-    let certainty = certainty(&h.base, names)?;
-    let weakest = (0..names.len()).min_by(|&a, &b| certainty[a].total_cmp(&certainty[b]))?;
-    let values = h.base.values().parameters;
-    let of_term = |names: &Vec<String>| names.iter().map(|n| values.get(n).copied()).collect::<Option<Vec<f64>>>();
-    let fitted: Vec<Vec<f64>> = names.iter().map(of_term).collect::<Option<_>>()?;
-    let fewer = sparse.without(weakest, &fitted)?;
+    parent: &Hypothesis<'d>,
+    from: &Values,
+    simulation: &Simulation,
+) -> Option<Hypothesis<'d>> {
+    let base = setting.fit(simulation, from, Some(&parent.base.whitener), 2, setting.iterations)?;
+    Some(setting.hypothesis(parent.effects.clone(), base))
+}
+
+/// A correction, fitted, without the terms that it does not need.
+fn pruned<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, sparse: Sparse, from: &Values) -> Option<Fit<'d>> {
+    let (simulation, names) = sparse.written()?;
+    let hypothesis = fit(setting, parent, from, &simulation)?;
+    let mut best = Fit { sparse, names, hypothesis };
+    while let Some(fewer) = without_the_weakest(setting, parent, &best) {
+        if fewer.hypothesis.log_evidence < best.hypothesis.log_evidence {
+            break;
+        }
+        best = fewer;
+    }
+    Some(best)
+}
+
+/// The correction with terms that show once it stands in the equations: around it the tangent is another one. `None` where they do not pay for
+/// themselves and for having been chosen.
+fn with_more<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, best: &Fit<'d>) -> Option<Fit<'d>> {
     if setting.budget.omits(Step::Terms) {
         return None;
     }
-    let (simulation, names) = fewer.written()?;
-    let h = fit(&simulation)?;
-    Some((fewer, names, h))
+    let open = correction(&best.hypothesis.base, setting.noise).filter(|o| o.gain > 0.0)?;
+    let Writable::Sparse(more) = open.writable? else { return None };
+    let longer = best.sparse.with(&fitted_values(best)?, &more);
+    let longer = pruned(setting, parent, longer, &best.hypothesis.base.values())?;
+    (longer.hypothesis.log_evidence > best.hypothesis.log_evidence + open.choice).then_some(longer)
+}
+
+/// Where each term's own parameters were fitted to.
+fn fitted_values(fit: &Fit<'_>) -> Option<Vec<Vec<f64>>> {
+    let values = fit.hypothesis.base.values().parameters;
+    let of_term = |names: &Vec<String>| names.iter().map(|n| values.get(n).copied()).collect();
+    fit.names.iter().map(of_term).collect()
+}
+
+/// The correction without the term whose coefficient is the smallest beside its standard error.
+fn without_the_weakest<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, best: &Fit<'d>) -> Option<Fit<'d>> {
+    let certainty = certainty(&best.hypothesis.base, &best.names)?;
+    let weakest = (0..best.names.len()).min_by(|&a, &b| certainty[a].total_cmp(&certainty[b]))?;
+    let sparse = best.sparse.without(weakest, &fitted_values(best)?)?;
+    if setting.budget.omits(Step::Terms) {
+        return None;
+    }
+    let (simulation, names) = sparse.written()?;
+    let hypothesis = fit(setting, parent, &parent.base.values(), &simulation)?;
+    Some(Fit { sparse, names, hypothesis })
 }
 
 /// Each term's coefficient over the width of its interval.

@@ -1,19 +1,15 @@
-//! The generic signals: functions of displacement and velocity, plays, lags, functions of time, of the input and of the output, each pushed
-//! through the tangent of the fitted simulation from the slot at which it acts.
+//! The generic terms: functions of displacement and velocity, plays, lags, functions of time, of the input and of the output ([`shapes`]), each
+//! pushed through the tangent of the fitted simulation from the slot at which it acts.
 
 use std::sync::Arc;
 
-use hysid_plant::{Expr, Function, Slot as Place};
+use hysid_plant::{Expr, Slot as Place};
 use rayon::prelude::*;
 
-use crate::answer::text::number;
-use crate::data::DataSet;
+use super::shapes::{self, Series, Shape, held_beyond};
 use crate::model::base::Base;
 use crate::search::screen::along;
 use crate::slot::Structure;
-
-/// Samples of a signal by stretch.
-type Series = Vec<Vec<f64>>;
 
 /// A generic signal before it is pushed through the simulation.
 struct Signal {
@@ -73,148 +69,6 @@ pub struct Term {
 
 /// Signals that are pushed through the simulation's tangent together.
 const TOGETHER: usize = 8;
-
-/// The signals of one coordinate that are tried: text, kind, series by stretch.
-fn shapes(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<(String, Kind, Series)> {
-    let all: Vec<f64> = x.concat();
-    let mut size: Vec<f64> = all.iter().map(|v| v.abs()).collect();
-    size.sort_by(f64::total_cmp);
-    let quantile = |q: f64| size.get(((size.len() as f64 - 1.0) * q) as usize).copied().unwrap_or(0.0);
-    let map =
-        |f: &dyn Fn(f64) -> f64| -> Vec<Vec<f64>> { x.iter().map(|s| s.iter().map(|v| f(*v)).collect()).collect() };
-    let mut out: Vec<(String, Kind, Series)> = vec![
-        (format!("{name}^2"), Kind::Even, map(&|v| v * v)),
-        (format!("{name}^3"), Kind::Odd, map(&|v| v * v * v)),
-        (format!("abs({name})"), Kind::Even, map(&f64::abs)),
-        (format!("abs({name})*{name}"), Kind::Odd, map(&|v| v * v.abs())),
-        (format!("sign({name})*sqrt(abs({name}))"), Kind::Odd, map(&|v| v.signum() * v.abs().sqrt())),
-    ];
-    if velocity {
-        let small = 0.05 * quantile(0.8);
-        if small > 0.0 {
-            out.push((format!("tanh({name}/{})", number(small)), Kind::Odd, map(&|v| (v / small).tanh())));
-        }
-    }
-    for q in [0.5, 0.8] {
-        let g = quantile(q);
-        out.push((format!("max({name} - {}, 0)", number(g)), Kind::Even, map(&|v| (v - g).max(0.0))));
-        out.push((format!("max(-{} - {name}, 0)", number(g)), Kind::Even, map(&|v| (-g - v).max(0.0))));
-    }
-    for q in [0.2, 0.5, 0.8] {
-        let r = 0.7 * quantile(q);
-        if r > 0.0 && !velocity {
-            let play = x
-                .iter()
-                .map(|s| {
-                    let mut w = s.first().copied().unwrap_or(0.0);
-                    s.iter()
-                        .map(|v| {
-                            w = w.max(v - r).min(v + r);
-                            w
-                        })
-                        .collect()
-                })
-                .collect();
-            out.push((format!("play({name}, {})", number(r)), Kind::Play, play));
-        }
-    }
-    out
-}
-
-/// A function of two series.
-fn both(a: &[Vec<f64>], b: &[Vec<f64>], f: impl Fn(f64, f64) -> f64) -> Series {
-    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| f(*a, *b)).collect()).collect()
-}
-
-/// What first-order lags of a coordinate leave of it: three time constants, of the length of the recording.
-fn lags(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<(String, Kind, Series)> {
-    let longest = data.stretches.iter().map(|s| s.len() as f64 * data.period_s).fold(0.0, f64::max);
-    [300.0, 60.0, 12.0]
-        .map(|part| {
-            let tau = longest / part;
-            let (a, ratio) = ((-data.period_s / tau).exp(), tau / data.period_s);
-            // Exact where the coordinate is linear between samples.
-            let left = |s: &Vec<f64>| {
-                let (mut before, mut behind) = (s.first().copied().unwrap_or(0.0), 0.0);
-                s.iter()
-                    .map(|v| {
-                        let settled = (v - before) * ratio;
-                        behind = settled + a * (behind - settled);
-                        before = *v;
-                        behind
-                    })
-                    .collect()
-            };
-            (format!("{name} - lag({name}, {})", number(tau)), Kind::Lag, x.iter().map(left).collect())
-        })
-        .into()
-}
-
-/// Tents over the recording by which a coordinate's coefficient may change.
-const TENTS: usize = 6;
-
-/// A coordinate with a coefficient that drifts, and one that changes during a part of the recording.
-fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<(String, Kind, Series)> {
-    let over = |f: &dyn Fn(f64) -> f64| -> Series {
-        x.iter()
-            .zip(&data.stretches)
-            .map(|(s, st)| s.iter().enumerate().map(|(n, v)| v * f(st.start_s + n as f64 * data.period_s)).collect())
-            .collect()
-    };
-    let mut out = vec![(format!("t*{name}"), Kind::Time, over(&|t| t))];
-    let ends = data.stretches.iter().map(|s| (s.start_s, s.start_s + s.len() as f64 * data.period_s));
-    let (first, last) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (c, d)| (a.min(c), b.max(d)));
-    let width = (last - first) / (TENTS - 1) as f64;
-    if width > 0.0 {
-        out.extend((0..TENTS).map(|i| {
-            let at = first + i as f64 * width;
-            let text = format!("max(1 - abs(t - {})/{}, 0)*{name}", number(at), number(width));
-            (text, Kind::Time, over(&|t| (1.0 - (t - at).abs() / width).max(0.0)))
-        }));
-    }
-    out
-}
-
-/// Products of displacement and velocity, and what is periodic in the displacement.
-fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>])) -> Vec<(String, Kind, Series)> {
-    let mut out = vec![
-        (format!("{a}^2*{b}"), Kind::Odd, both(x, v, |x, v| x * x * v)),
-        (format!("{a}*{b}^2"), Kind::Odd, both(x, v, |x, v| x * v * v)),
-        (format!("abs({a})*{b}"), Kind::Odd, both(x, v, |x, v| x.abs() * v)),
-        (format!("{a}*abs({b})"), Kind::Odd, both(x, v, |x, v| x * v.abs())),
-        (format!("abs({a})*sign({b})"), Kind::Odd, both(x, v, |x, v| x.abs() * v.signum())),
-        (format!("{a}*{b}"), Kind::Even, both(x, v, |x, v| x * v)),
-    ];
-    let span = spread(x);
-    for cycles in [1.0, 2.0, 4.0].into_iter().filter(|_| span > 0.0) {
-        let k = std::f64::consts::TAU * cycles / span;
-        let n = number(k);
-        out.extend([
-            (format!("sin({n}*{a})"), Kind::Odd, both(x, v, |x, _| (k * x).sin())),
-            (format!("cos({n}*{a})"), Kind::Even, both(x, v, |x, _| (k * x).cos())),
-            (format!("{b}*sin({n}*{a})"), Kind::Even, both(x, v, |x, v| v * (k * x).sin())),
-            (format!("{b}*cos({n}*{a})"), Kind::Odd, both(x, v, |x, v| v * (k * x).cos())),
-        ]);
-    }
-    out
-}
-
-/// Smallest and largest value.
-fn range(x: &[Vec<f64>]) -> (f64, f64) {
-    x.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
-}
-
-/// Largest less smallest value.
-fn spread(x: &[Vec<f64>]) -> f64 {
-    let (low, high) = range(x);
-    if high > low { high - low } else { 0.0 }
-}
-
-/// A coordinate, held at the ends of the range that its series has.
-fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
-    let (low, high) = range(x);
-    Expr::call2(Function::Min, Expr::call2(Function::Max, coordinate, low), high)
-}
 
 /// The generic terms of a fitted simulation, as responses in the unit of the outputs.
 pub fn terms(base: &Base<'_>) -> Vec<Term> {
@@ -282,22 +136,21 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
                 held: held_beyond(meaning.clone(), x),
             })
             .collect();
-        let mut found: Vec<(String, Kind, Series)> = Vec::new();
+        let mut found: Vec<Shape> = Vec::new();
         for ((name, _, velocity), x) in coordinates.iter().zip(&series) {
-            found.extend(shapes(name, x, *velocity));
+            found.extend(shapes::curves(name, x, *velocity));
             if plant {
-                found.extend(lags(name, x, data));
-                found.extend(changes(name, x, data));
+                found.extend(shapes::lags(name, x, data));
+                found.extend(shapes::changes(name, x, data));
             }
             for (u, input) in &inputs {
-                found.push((format!("{u}*{name}"), Kind::Even, both(input, x, |u, x| u * x)));
-                found.push((format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)));
+                found.extend(shapes::driven((u, input), (name, x)));
             }
         }
         if let ([(a, _, _), (b, _, _)], [x, v], true) = (coordinates.as_slice(), series.as_slice(), plant) {
-            found.extend(surface((a, x), (b, v)));
+            found.extend(shapes::surface((a, x), (b, v)));
         }
-        work.extend(found.into_iter().map(|(text, kind, series)| Signal {
+        work.extend(found.into_iter().map(|Shape { text, kind, series }| Signal {
             place,
             slot: label.clone(),
             side,

@@ -17,7 +17,7 @@ use crate::search::hypothesis::Effect;
 use crate::search::screen::along;
 
 use super::modulation::Modulated;
-use super::varying::View;
+use super::view::View;
 
 /// Odds beforehand that a law's strength is not the same everywhere. On development cases a single law that was named firmly at a level below
 /// the noise was one of the catalogue in nine of ten.

@@ -12,8 +12,9 @@ use rand_distr::{Distribution, StandardNormal};
 use super::course::{COURSES, Course, Series, Time};
 use super::modulation::{Modulated, modulated};
 use super::regress::regress;
+use super::view::View;
 use crate::answer::text::number;
-use crate::evidence::{Layout, Projector, Wander, Whitener, dot, lines, norm2, score};
+use crate::evidence::{Wander, Whitener, dot, lines, norm2};
 use crate::mechanism::SLOW;
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
@@ -81,51 +82,6 @@ struct Candidate {
     course: Course,
     columns: Vec<Vec<f64>>,
     gain: f64,
-}
-
-/// The residual under a noise, off what is estimated besides.
-pub(super) struct View<'a> {
-    noise: &'a Whitener,
-    layout: &'a Layout,
-    own: Projector,
-    pub(super) r: Vec<f64>,
-}
-
-impl<'a> View<'a> {
-    pub(super) fn new(base: &'a Base<'_>, noise: &'a Whitener) -> Self {
-        let layout = &base.model.data().layout;
-        let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
-        let mut r = noise.apply(layout, &base.fit.residual);
-        own.remove(&mut r);
-        Self { noise, layout, own, r }
-    }
-
-    pub(super) fn of(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let white = |x: &Vec<f64>| {
-            let mut w = self.noise.apply(self.layout, x);
-            self.own.remove(&mut w);
-            w
-        };
-        columns.iter().map(white).collect()
-    }
-
-    /// Squared norm of a column under the noise, with what is estimated besides in it.
-    pub(super) fn noise_of(&self, column: &[f64]) -> f64 {
-        norm2(&self.noise.apply(self.layout, column))
-    }
-
-    /// Log likelihood that free amplitudes of a few columns gain.
-    fn free_gain(&self, columns: &[Vec<f64>]) -> f64 {
-        0.5 * score(norm2(&self.r), Projector::new(self.of(columns)).inside(&self.r), self.r.len(), 0)
-    }
-
-    /// Log likelihood of the residual without the price of the noise's coefficients, and whatever is estimated besides at its best.
-    fn log_likelihood(&self, base: &Base<'_>) -> f64 {
-        let data = base.model.data();
-        let plain = self.noise.apply(self.layout, &base.fit.residual);
-        let fitted = 0.5 * (norm2(&plain) - norm2(&self.r));
-        log_likelihood(data, self.noise, &base.fit.residual) + fitted + spared(data, self.noise, &base.whitener)
-    }
 }
 
 /// The parameter that varies most likely, judged with a noise model of its own; `None` where nothing can be modulated.
@@ -281,14 +237,15 @@ fn judged(
 mod oscillator;
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::cell::Cell;
     use std::f64::consts::TAU;
 
     use hysid_plant::Simulation;
     use hysid_signal::{Channel, Clock, Recording};
 
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    pub use super::oscillator::BASELINE;
+    use super::oscillator::{PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::data::DataSet;
     use crate::model::base::{Start, fit_simulation};
@@ -297,7 +254,7 @@ mod tests {
     use crate::refit::LmOptions;
 
     /// An oscillator whose stiffness is multiplied by a function of the time, with white noise of this share of the output.
-    fn recorded(seed: u64, factor: impl Fn(f64) -> f64, noise: f64) -> DataSet {
+    pub fn recorded(seed: u64, factor: impl Fn(f64) -> f64, noise: f64) -> DataSet {
         let mut random = normal(seed);
         let u = drive(1200, &mut random);
         let (steps, (.., k)) = (Cell::new(0u32), REAL);

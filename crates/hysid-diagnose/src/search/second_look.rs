@@ -118,7 +118,7 @@ impl<'d> Search<'_, 'd> {
     }
 
     /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.
-    fn places_of(&self, effect: &Effect) -> f64 {
+    pub fn places_of(&self, effect: &Effect) -> f64 {
         let moments = effect.written.shapes.iter().filter(|shape| shape.places == Places::Moments).count();
         lines_of(self.setting.data, &effect.written) * MOMENTS.powi(moments as i32)
     }

@@ -1,0 +1,136 @@
+//! Glitches: single samples of an output that stand out of their neighbours, as a lost bit or a spark leaves them.
+//!
+//! A few samples that are wrong by a hundred times the noise bend a least-squares calibration and hide everything that is below them. What moves by its
+//! inertia never leaves its course for one sample: beside the simulation such a sample is no physics, whatever the simulation leaves out. An output that holds
+//! anything that may jump (an input, the sign of a velocity) is left as it is.
+
+use hysid_plant::{Expr, Simulation};
+
+use super::DataSet;
+use crate::answer::text::number;
+
+/// Deviations from the mean of its neighbours, in standard deviations of what all samples have, beyond which a sample is none of them: once in a million
+/// samples of white noise.
+const BEYOND: f64 = 5.0;
+/// Steps of a converter that a deviation must have besides.
+const LEVELS: f64 = 3.0;
+/// Largest share of samples that are wrong; more of them are a property of the noise.
+const MOST: f64 = 0.02;
+/// Standard deviation of a normal variable over its median size.
+const NORMAL: f64 = 1.4826;
+
+/// The data with glitches replaced by what their neighbours say of the error, and sentences about it; `None` where there are none.
+pub fn mended(simulation: &Simulation, data: &DataSet, residual: &[f64]) -> Option<DataSet> {
+    let mut out = data.clone();
+    for (output, o) in simulation.outputs.iter().enumerate().filter(|(_, o)| is_smooth(simulation, &o.expression)) {
+        let (mut count, mut first_s) = (0, f64::INFINITY);
+        for s in data.layout.series.iter().filter(|s| s.output == output) {
+            let (e, y) = (&residual[s.rows.clone()], &data.y[s.rows.clone()]);
+            for (n, deviation) in glitches(e, y) {
+                out.move_row(s, n, -deviation);
+                count += 1;
+                first_s = data.time_of_rows(s).nth(n).unwrap_or(first_s).min(first_s);
+            }
+        }
+        if count > 0 {
+            let (many, first) = (if count == 1 { "sample stands" } else { "samples stand" }, number(first_s));
+            out.notes.push(format!(
+                "{count} {many} out of the neighbours in `{}` (the first at {first} s), as no motion does: taken for glitches of the sensor, and replaced",
+                o.column
+            ));
+        }
+    }
+    (out.notes.len() > data.notes.len()).then_some(out)
+}
+
+/// Whether an output moves as smoothly as the states do.
+fn is_smooth(simulation: &Simulation, e: &Expr) -> bool {
+    let of = |e: &Expr| is_smooth(simulation, e);
+    match e {
+        Expr::Number(_) => true,
+        Expr::Symbol(name) => simulation.input(name).is_none() && name != "t",
+        Expr::Neg(a) => of(a),
+        Expr::Binary(_, a, b) => of(a) && of(b),
+        Expr::Call(..) | Expr::Memory(..) => false,
+    }
+}
+
+/// Places in a series of errors `e` of the measured `y` that are glitches, each with its deviation from what the neighbours say.
+fn glitches(e: &[f64], y: &[f64]) -> Vec<(usize, f64)> {
+    let deviation = |n: usize| e[n] - 0.5 * (e[n - 1] + e[n + 1]);
+    let inner = 1..e.len().saturating_sub(1);
+    let sizes: Vec<f64> = inner.clone().map(|n| deviation(n).abs()).collect();
+    let scale = NORMAL * median(sizes.clone());
+    let level = y.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+    let least = (BEYOND * scale).max(if level.is_finite() { LEVELS * level } else { 0.0 });
+    let stands_out = |n: &usize| {
+        let size = sizes[n - 1];
+        let beside = [n.wrapping_sub(2), *n].map(|i| sizes.get(i).copied().unwrap_or(0.0));
+        // A step shows at both of its sides, and its neighbours differ.
+        size > least && beside.iter().all(|b| *b < size) && (e[n + 1] - e[n - 1]).abs() < size
+    };
+    let found: Vec<(usize, f64)> = inner.filter(stands_out).map(|n| (n, deviation(n))).collect();
+    if scale > 0.0 && found.len() as f64 <= MOST * e.len() as f64 { found } else { Vec::new() }
+}
+
+/// The middle one of some values; 0 where there are none.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+#[cfg(test)]
+#[path = "../../tests/common/oscillator.rs"]
+mod oscillator;
+
+#[cfg(test)]
+mod tests {
+    use super::oscillator::normal;
+    use super::*;
+
+    fn places(e: &[f64]) -> Vec<usize> {
+        glitches(e, e).into_iter().map(|(n, _)| n).collect()
+    }
+
+    #[test]
+    fn single_samples_that_stand_out_are_found_and_their_neighbours_are_not() {
+        let mut random = normal(1);
+        let clean: Vec<f64> = (0..3000).map(|n| (0.01 * n as f64).sin() * 20.0 + random()).collect();
+        assert_eq!(places(&clean), [0; 0]);
+        let mut bad = clean.clone();
+        for n in [20, 700, 2000] {
+            bad[n] += 90.0;
+        }
+        assert_eq!(places(&bad), [20, 700, 2000]);
+        let (_, size) = glitches(&bad, &bad)[0];
+        assert!((size - 90.0).abs() < 5.0, "{size}");
+    }
+
+    #[test]
+    fn steps_ramps_and_levels_of_a_converter_are_no_glitches() {
+        let mut random = normal(2);
+        let step: Vec<f64> = (0..2000).map(|n| if n > 900 { 300.0 } else { 0.0 } + random()).collect();
+        assert_eq!(places(&step), [0; 0]);
+        // A slow course behind a coarse converter: between its levels the last bit flickers now and then.
+        let slow: Vec<f64> = (0..2000).map(|n| 0.004 * n as f64 + 0.02 * random()).collect();
+        let levels: Vec<f64> = slow.iter().map(|x| x.round()).collect();
+        let error: Vec<f64> = levels.iter().zip(0..).map(|(y, n)| y - 0.004 * f64::from(n)).collect();
+        assert_eq!(glitches(&error, &levels).len(), 0);
+    }
+
+    #[test]
+    fn noise_with_heavy_tails_throughout_is_left_alone() {
+        let mut random = normal(3);
+        let heavy: Vec<f64> = (0..2000).map(|_| random().powi(5)).collect();
+        assert_eq!(places(&heavy), [0; 0]);
+    }
+
+    #[test]
+    fn only_what_the_states_move_smoothly_is_mended() {
+        let text = "[time]\nperiod_s = 0.1\n[inputs]\nu = \"u_N\"\n[parameters]\nk = { value = 1.0, min = 0.0 }\n[states]\nx = { derivative = \"u - k*x\", initial = 0.0 }\n[outputs]\ny_m = \"k*x\"\n";
+        let simulation = Simulation::parse(text, "test.sim.toml").unwrap();
+        let smooth = |e: &str| is_smooth(&simulation, &Expr::parse(e).unwrap());
+        assert!(smooth("2*k*x - x^2"));
+        assert!(!smooth("u - k*x") && !smooth("k*sign(x)") && !smooth("relay(x, 0.1, 0.2)") && !smooth("x + t"));
+    }
+}

@@ -1,0 +1,249 @@
+//! The shapes of generic terms: curves, knees, plays and relays of one coordinate, what lags leave of it, coefficients that change in time, and
+//! products of a function of the displacement with one of the velocity.
+
+use std::f64::consts::TAU;
+
+use hysid_plant::{Expr, Function};
+
+use super::terms::Kind;
+use crate::answer::text::number;
+use crate::data::DataSet;
+
+/// Samples of a signal by stretch.
+pub type Series = Vec<Vec<f64>>;
+
+/// A shape with its samples.
+pub struct Shape {
+    /// As it is written over the names of its coordinates.
+    pub text: String,
+    /// What it is a function of.
+    pub kind: Kind,
+    /// Its samples.
+    pub series: Series,
+}
+
+impl Shape {
+    fn new(text: String, kind: Kind, series: Series) -> Self {
+        Self { text, kind, series }
+    }
+}
+
+/// Shares of the samples that lie within a knee, and within the half width of a play or relay over [`WIDTH`].
+const KNEES: [f64; 2] = [0.5, 0.8];
+const WIDTHS: [f64; 3] = [0.2, 0.5, 0.8];
+const WIDTH: f64 = 0.7;
+
+/// Time constants of lags, as parts of the longest stretch.
+const LAGS: [f64; 3] = [300.0, 60.0, 12.0];
+
+/// Tents over the recording by which a coordinate's coefficient may change.
+const TENTS: usize = 6;
+
+/// Cycles over the range of a displacement: half octaves, so that the fit of a wave number begins in the right valley. More cycles go by between samples
+/// of a fast motion.
+const CYCLES: [f64; 5] = [1.0, 1.41, 2.0, 2.83, 4.0];
+
+/// Width of a gate over the distance of its knee.
+const GATE: f64 = 0.1;
+
+/// A function of each sample.
+fn each(x: &[Vec<f64>], f: impl Fn(f64) -> f64) -> Series {
+    x.iter().map(|s| s.iter().map(|v| f(*v)).collect()).collect()
+}
+
+/// A function of two series.
+fn both(a: &[Vec<f64>], b: &[Vec<f64>], f: impl Fn(f64, f64) -> f64) -> Series {
+    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| f(*a, *b)).collect()).collect()
+}
+
+/// What follows from each sample and what was before, from the first sample of each stretch on.
+fn in_turn<S>(x: &[Vec<f64>], start: impl Fn(f64) -> S, next: impl Fn(&mut S, f64) -> f64) -> Series {
+    let stretch = |s: &Vec<f64>| {
+        let mut state = start(s.first().copied().unwrap_or(0.0));
+        s.iter().map(|v| next(&mut state, *v)).collect()
+    };
+    x.iter().map(stretch).collect()
+}
+
+/// Quantiles of a coordinate's size.
+fn quantiles<const N: usize>(x: &[Vec<f64>], at: [f64; N]) -> [f64; N] {
+    let mut size: Vec<f64> = x.iter().flatten().map(|v| v.abs()).collect();
+    size.sort_by(f64::total_cmp);
+    at.map(|q| size.get(((size.len() as f64 - 1.0) * q) as usize).copied().unwrap_or(0.0))
+}
+
+/// Curves and knees of one coordinate, and what remembers it at any rate.
+pub fn curves(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<Shape> {
+    let mut out = vec![
+        Shape::new(format!("{name}^2"), Kind::Even, each(x, |v| v * v)),
+        Shape::new(format!("{name}^3"), Kind::Odd, each(x, |v| v * v * v)),
+        Shape::new(format!("abs({name})"), Kind::Even, each(x, f64::abs)),
+        Shape::new(format!("abs({name})*{name}"), Kind::Odd, each(x, |v| v * v.abs())),
+        Shape::new(format!("sign({name})*sqrt(abs({name}))"), Kind::Odd, each(x, |v| v.signum() * v.abs().sqrt())),
+    ];
+    if velocity {
+        let [small] = quantiles(x, [0.8]).map(|q| 0.05 * q);
+        if small > 0.0 {
+            out.push(Shape::new(format!("tanh({name}/{})", number(small)), Kind::Odd, each(x, |v| (v / small).tanh())));
+        }
+    }
+    for g in quantiles(x, KNEES) {
+        let n = number(g);
+        out.push(Shape::new(format!("max({name} - {n}, 0)"), Kind::Even, each(x, |v| (v - g).max(0.0))));
+        out.push(Shape::new(format!("max(-{n} - {name}, 0)"), Kind::Even, each(x, |v| (-g - v).max(0.0))));
+    }
+    if !velocity {
+        out.extend(memories(name, x));
+    }
+    out
+}
+
+/// Plays of a coordinate and relays that switch at the same distances.
+fn memories(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
+    let mut out = Vec::new();
+    for r in quantiles(x, WIDTHS).map(|q| WIDTH * q).into_iter().filter(|r| *r > 0.0) {
+        let n = number(r);
+        let play = in_turn(
+            x,
+            |first| first,
+            |w, v| {
+                *w = w.max(v - r).min(v + r);
+                *w
+            },
+        );
+        out.push(Shape::new(format!("play({name}, {n})"), Kind::Play, play));
+        // As the operator has it: at rest it is down.
+        let relay = in_turn(
+            x,
+            |_| -1.0,
+            |up, v| {
+                *up = if v > r {
+                    1.0
+                } else if v < -r {
+                    -1.0
+                } else {
+                    *up
+                };
+                *up
+            },
+        );
+        out.push(Shape::new(format!("relay({name}, -{n}, {n})"), Kind::Play, relay));
+    }
+    out
+}
+
+/// What first-order lags of a coordinate leave of it: time constants of the length of the recording.
+pub fn lags(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
+    let longest = data.stretches.iter().map(|s| s.len() as f64 * data.period_s).fold(0.0, f64::max);
+    LAGS.map(|part| {
+        let tau = longest / part;
+        let (a, ratio) = ((-data.period_s / tau).exp(), tau / data.period_s);
+        // Exact where the coordinate is linear between samples.
+        let left = in_turn(
+            x,
+            |first| (first, 0.0),
+            |(before, behind), v| {
+                let settled = (v - *before) * ratio;
+                *behind = settled + a * (*behind - settled);
+                *before = v;
+                *behind
+            },
+        );
+        Shape::new(format!("{name} - lag({name}, {})", number(tau)), Kind::Lag, left)
+    })
+    .into()
+}
+
+/// A coordinate with a coefficient that drifts, and one that changes during a part of the recording.
+pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
+    let over = |f: &dyn Fn(f64) -> f64| -> Series {
+        x.iter()
+            .zip(&data.stretches)
+            .map(|(s, st)| s.iter().enumerate().map(|(n, v)| v * f(st.start_s + n as f64 * data.period_s)).collect())
+            .collect()
+    };
+    let mut out = vec![Shape::new(format!("t*{name}"), Kind::Time, over(&|t| t))];
+    let ends = data.stretches.iter().map(|s| (s.start_s, s.start_s + s.len() as f64 * data.period_s));
+    let (first, last) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (c, d)| (a.min(c), b.max(d)));
+    let width = (last - first) / (TENTS - 1) as f64;
+    if width > 0.0 {
+        out.extend((0..TENTS).map(|i| {
+            let at = first + i as f64 * width;
+            let text = format!("max(1 - abs(t - {})/{}, 0)*{name}", number(at), number(width));
+            Shape::new(text, Kind::Time, over(&|t| (1.0 - (t - at).abs() / width).max(0.0)))
+        }));
+    }
+    out
+}
+
+/// A coordinate with a coefficient that follows an input or its size.
+pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 2] {
+    [
+        Shape::new(format!("{u}*{name}"), Kind::Even, both(input, x, |u, x| u * x)),
+        Shape::new(format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)),
+    ]
+}
+
+/// A factor of a product: how it is written, whether it is odd, and its values.
+type Factor<'f> = (String, bool, Box<dyn Fn(f64) -> f64 + 'f>);
+
+/// Products of a function of the displacement `x` and one of the velocity `v`, and what is periodic in the displacement. A resistance
+/// that is proportional to the speed, one that has its sign only and one that has its size only may each depend on the place: in proportion to it or
+/// to its size, on one side of a knee, or in waves.
+pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>])) -> Vec<Shape> {
+    let speeds: [Factor<'_>; 3] = [
+        (b.to_owned(), true, Box::new(|v| v)),
+        (format!("sign({b})"), true, Box::new(f64::signum)),
+        (format!("abs({b})"), false, Box::new(f64::abs)),
+    ];
+    let mut places: Vec<Factor<'_>> = vec![
+        (a.to_owned(), true, Box::new(|x| x)),
+        (format!("abs({a})"), false, Box::new(f64::abs)),
+        (format!("{a}^2"), false, Box::new(|x| x * x)),
+    ];
+    for g in quantiles(x, KNEES).into_iter().filter(|g| *g > 0.0) {
+        let (n, s, width) = (number(g), GATE * g, number(GATE * g));
+        places.push((format!("(1 + tanh(({a} - {n})/{width}))"), false, Box::new(move |x| 1.0 + ((x - g) / s).tanh())));
+        places.push((format!("(1 - tanh(({a} + {n})/{width}))"), false, Box::new(move |x| 1.0 - ((x + g) / s).tanh())));
+    }
+    let kind = |odd: bool| if odd { Kind::Odd } else { Kind::Even };
+    let mut out = vec![Shape::new(format!("{a}*{b}^2"), Kind::Odd, both(x, v, |x, v| x * v * v))];
+    let span = spread(x);
+    for cycles in CYCLES.into_iter().filter(|_| span > 0.0) {
+        let k = TAU * cycles / span;
+        let n = number(k);
+        for (text, odd, f) in
+            [(format!("sin({n}*{a})"), true, f64::sin as fn(f64) -> f64), (format!("cos({n}*{a})"), false, f64::cos)]
+        {
+            out.push(Shape::new(text.clone(), kind(odd), each(x, |x| f(k * x))));
+            places.push((text, odd, Box::new(move |x| f(k * x))));
+        }
+    }
+    for (place, of_place, p) in &places {
+        for (speed, of_speed, s) in &speeds {
+            out.push(Shape::new(
+                format!("{place}*{speed}"),
+                kind(of_place != of_speed),
+                both(x, v, |x, v| p(x) * s(v)),
+            ));
+        }
+    }
+    out
+}
+
+/// Smallest and largest value.
+fn range(x: &[Vec<f64>]) -> (f64, f64) {
+    x.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
+}
+
+/// Largest less smallest value.
+fn spread(x: &[Vec<f64>]) -> f64 {
+    let (low, high) = range(x);
+    if high > low { high - low } else { 0.0 }
+}
+
+/// A coordinate, held at the ends of the range that its series has.
+pub fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
+    let (low, high) = range(x);
+    Expr::call2(Function::Min, Expr::call2(Function::Max, coordinate, low), high)
+}

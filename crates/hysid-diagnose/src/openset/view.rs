@@ -1,0 +1,53 @@
+//! The residual of a fitted simulation as a noise model sees it.
+
+use crate::evidence::{Layout, Projector, Whitener, norm2, score};
+use crate::model::base::{Base, log_likelihood, spared};
+
+/// The residual under a noise, off what is estimated besides.
+pub struct View<'a> {
+    /// The noise.
+    pub noise: &'a Whitener,
+    layout: &'a Layout,
+    own: Projector,
+    /// The whitened residual.
+    pub r: Vec<f64>,
+}
+
+impl<'a> View<'a> {
+    /// Of a fitted simulation.
+    pub fn new(base: &'a Base<'_>, noise: &'a Whitener) -> Self {
+        let layout = &base.model.data().layout;
+        let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
+        let mut r = noise.apply(layout, &base.fit.residual);
+        own.remove(&mut r);
+        Self { noise, layout, own, r }
+    }
+
+    /// Columns likewise.
+    pub fn of(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let white = |x: &Vec<f64>| {
+            let mut w = self.noise.apply(self.layout, x);
+            self.own.remove(&mut w);
+            w
+        };
+        columns.iter().map(white).collect()
+    }
+
+    /// Squared norm of a column under the noise, with what is estimated besides in it.
+    pub(super) fn noise_of(&self, column: &[f64]) -> f64 {
+        norm2(&self.noise.apply(self.layout, column))
+    }
+
+    /// Log likelihood that free amplitudes of a few columns gain.
+    pub fn free_gain(&self, columns: &[Vec<f64>]) -> f64 {
+        0.5 * score(norm2(&self.r), Projector::new(self.of(columns)).inside(&self.r), self.r.len(), 0)
+    }
+
+    /// Log likelihood of the residual without the price of the noise's coefficients, and whatever is estimated besides at its best.
+    pub fn log_likelihood(&self, base: &Base<'_>) -> f64 {
+        let data = base.model.data();
+        let plain = self.noise.apply(self.layout, &base.fit.residual);
+        let fitted = 0.5 * (norm2(&plain) - norm2(&self.r));
+        log_likelihood(data, self.noise, &base.fit.residual) + fitted + spared(data, self.noise, &base.whitener)
+    }
+}

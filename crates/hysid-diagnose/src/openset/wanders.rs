@@ -1,0 +1,91 @@
+//! Whether a parameter wanders or oscillates where an effect of a set says that it changes once, drifts or follows a temperature.
+//!
+//! Each of these takes a good part of what a parameter does that never rests, and beside one another they imitate it well. A parameter that varies is not
+//! of the catalogue: it is heard as a rival of each such effect, around the set without that effect.
+
+use super::{noises, varying};
+use crate::answer::text::number;
+use crate::mechanism::Family;
+use crate::search::Search;
+use crate::search::hypothesis::{Effect, Hypothesis};
+use crate::verdict::weigh::EVIDENCE_WEIGHT;
+
+/// A parameter that varies in the place of an effect.
+#[derive(Debug, Clone)]
+pub struct Wanders {
+    /// The probability of it, beside the effect.
+    pub probability: f64,
+    /// What it does, in words.
+    pub words: String,
+}
+
+/// Below this probability nothing is said of it.
+const WORTH_SAYING: f64 = 0.02;
+
+impl Wanders {
+    /// In words, beside the effect; `None` where it is too unlikely to be said.
+    pub fn in_place_of(&self, e: &Effect) -> Option<String> {
+        (self.probability >= WORTH_SAYING).then(|| {
+            let Self { probability, words } = self;
+            let (id, slot) = (e.mechanism.id, &e.slot.label);
+            format!("with a probability of {} it is not {id} at {slot} but {words}", number(*probability))
+        })
+    }
+}
+
+/// For each effect of a set that changes a parameter in time, a parameter that varies otherwise; `None` for the others, where nothing that varies is
+/// seen, and where the set without the effect was not fitted.
+pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) -> Vec<Option<Wanders>> {
+    let best = &pool[winner];
+    let of = |member: usize| {
+        if best.effects[member].mechanism.family != Family::TimeVariation {
+            return None;
+        }
+        let key = best.key_without(member);
+        let rest = pool.iter().find(|h| h.key() == key)?;
+        let kind = search.setting.noise;
+        let found = varying(&rest.base, kind, &noises(&rest.base, kind))?;
+        // What varies has paid for the parameters among which it was found; a moment was looked for too.
+        let places = search.places_of(&best.effects[member]).ln();
+        let lead = best.log_evidence - rest.log_evidence - places - found.gain;
+        let probability = 1.0 / (1.0 + (EVIDENCE_WEIGHT * lead).exp());
+        Some(Wanders { probability, words: found.words() })
+    };
+    (0..best.effects.len()).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::mechanism::SLOW;
+    use crate::model::base::NoiseKind;
+    use crate::openset::varying::tests::{BASELINE, recorded};
+    use crate::request::{Hooks, Options};
+    use crate::search::budget::Budget;
+    use crate::search::hypothesis::calibrated;
+
+    /// The probability that the stiffness of an oscillator wanders, beside an abrupt change of it, where it is multiplied by this function of the time.
+    fn beside_a_change(factor: impl Fn(f64) -> f64) -> f64 {
+        let data = recorded(6, factor, 0.02);
+        let budget = Budget::new(&|_| false);
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
+        let search = Search::new(setting, Options::default(), &hooks);
+        let question = vec![("abrupt_change".to_owned(), "parameter:k".to_owned())];
+        let changed = search.answer(&none, &question).unwrap().unwrap();
+        assert!(changed.log_evidence > none.log_evidence + SLOW, "{} {}", changed.log_evidence, none.log_evidence);
+        let found = wanders(&search, &[none, changed], 1);
+        found[0].as_ref().map_or(0.0, |w| w.probability)
+    }
+
+    #[test]
+    fn a_parameter_that_wanders_is_heard_beside_one_that_changes() {
+        let sure = beside_a_change(|t| if t > 6.0 { 1.03 } else { 1.0 });
+        assert!(sure < 0.02, "{sure}");
+        let walk = beside_a_change(|t| 1.0 + 0.02 * ((0.31 * t).sin() + (0.17 * t).cos() * (0.53 * t).sin()));
+        assert!(walk > 0.1, "{walk}");
+    }
+}
