@@ -8,7 +8,7 @@ use crate::answer::picture::Picture;
 use crate::answer::records::*;
 use crate::answer::text::number;
 use crate::calibration::fair::calibrate;
-use crate::data::glitches::mended;
+use crate::data::glitches::{mended, told};
 use crate::data::intake::{Intake, intake};
 use crate::error::DiagnoseError;
 use crate::experiment::fresh::gamble;
@@ -237,6 +237,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let augmented = written.map(|h| h.base.document());
     let before = free_run(&baseline, &held, setting.substeps);
     let after = augmented.as_ref().and_then(|a| free_run(a, &held, setting.substeps));
+    if let Some(run) = &before {
+        let errors: Vec<f64> = held.y.iter().zip(&run.prediction).map(|(y, p)| y - p).collect();
+        file.notes.extend(told(simulation, &held, &errors));
+    }
     file.fit = fits(simulation, &held, before.as_ref(), after.as_ref(), options.seed, request.holdout.is_empty());
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));

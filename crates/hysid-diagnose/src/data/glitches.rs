@@ -8,6 +8,7 @@ use hysid_plant::{Expr, Simulation};
 
 use super::DataSet;
 use crate::answer::text::number;
+use crate::evidence::Series;
 
 /// Deviations from the mean of its neighbours, in standard deviations of what all samples have, beyond which a sample is none of them: once in a million
 /// samples of white noise.
@@ -19,28 +20,63 @@ const MOST: f64 = 0.02;
 /// Standard deviation of a normal variable over its median size.
 const NORMAL: f64 = 1.4826;
 
-/// The data with glitches replaced by what their neighbours say of the error, and sentences about it; `None` where there are none.
+/// The data with glitches replaced by what their neighbours say of the error, with a note for each output; `None` where there are none.
 pub fn mended(simulation: &Simulation, data: &DataSet, residual: &[f64]) -> Option<DataSet> {
+    let found = found(simulation, data, residual);
     let mut out = data.clone();
-    for (output, o) in simulation.outputs.iter().enumerate().filter(|(_, o)| is_smooth(simulation, &o.expression)) {
-        let (mut count, mut first_s) = (0, f64::INFINITY);
-        for s in data.layout.series.iter().filter(|s| s.output == output) {
-            let (e, y) = (&residual[s.rows.clone()], &data.y[s.rows.clone()]);
-            for (n, deviation) in glitches(e, y) {
-                out.move_row(s, n, -deviation);
-                count += 1;
-                first_s = data.time_of_rows(s).nth(n).unwrap_or(first_s).min(first_s);
-            }
-        }
-        if count > 0 {
-            let (many, first) = (if count == 1 { "sample stands" } else { "samples stand" }, number(first_s));
-            out.notes.push(format!(
-                "{count} {many} out of the neighbours in `{}` (the first at {first} s), as no motion does: taken for glitches of the sensor, and replaced",
-                o.column
-            ));
-        }
+    for glitch in found.iter().flat_map(|(_, all)| all) {
+        out.move_row(glitch.series, glitch.row, -glitch.deviation);
     }
-    (out.notes.len() > data.notes.len()).then_some(out)
+    out.notes.extend(
+        words(simulation, data, &found).map(|w| format!("{w}: taken for glitches of the sensor, and replaced")),
+    );
+    (!found.is_empty()).then_some(out)
+}
+
+/// Sentences about glitches in data that only score, where they stay.
+pub fn told(simulation: &Simulation, data: &DataSet, residual: &[f64]) -> Vec<String> {
+    let found = found(simulation, data, residual);
+    words(simulation, data, &found)
+        .map(|w| format!("hold-out: {w}: glitches of the sensor, which stand in the errors"))
+        .collect()
+}
+
+/// A sample that stands out of its neighbours.
+struct Glitch<'d> {
+    series: &'d Series,
+    /// Its place in the series.
+    row: usize,
+    /// What it is off from what the neighbours say of the error.
+    deviation: f64,
+}
+
+/// The glitches of each output that has some.
+fn found<'d>(simulation: &Simulation, data: &'d DataSet, residual: &[f64]) -> Vec<(usize, Vec<Glitch<'d>>)> {
+    let smooth = simulation.outputs.iter().enumerate().filter(|(_, o)| is_smooth(simulation, &o.expression));
+    let of = |output: usize| {
+        let series = data.layout.series.iter().filter(move |s| s.output == output);
+        let all = series.flat_map(|s| {
+            let places = glitches(&residual[s.rows.clone()], &data.y[s.rows.clone()]);
+            places.into_iter().map(move |(row, deviation)| Glitch { series: s, row, deviation })
+        });
+        (output, all.collect::<Vec<_>>())
+    };
+    smooth.map(|(output, _)| of(output)).filter(|(_, all)| !all.is_empty()).collect()
+}
+
+/// What was found, in words for each output.
+fn words<'a>(
+    simulation: &'a Simulation,
+    data: &'a DataSet,
+    found: &'a [(usize, Vec<Glitch<'_>>)],
+) -> impl Iterator<Item = String> + 'a {
+    found.iter().filter_map(|(output, all)| {
+        let first = all.first()?;
+        let at_s = data.time_of_rows(first.series).nth(first.row)?;
+        let many = if all.len() == 1 { "1 sample stands" } else { &format!("{} samples stand", all.len()) };
+        let column = &simulation.outputs[*output].column;
+        Some(format!("{many} out of the neighbours in `{column}` (the first at {} s), as no motion does", number(at_s)))
+    })
 }
 
 /// Whether an output moves as smoothly as the states do.

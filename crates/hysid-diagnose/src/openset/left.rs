@@ -3,7 +3,7 @@
 
 use super::needed::{Refitted, fitted};
 use super::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
-use crate::answer::file::{CorrectionRecord, RemainingRecord, TermRecord, finite};
+use crate::answer::file::{CorrectionRecord, RemainingRecord, finite};
 use crate::evidence::SurrogateTest;
 use crate::search::Search;
 use crate::search::budget::Step;
@@ -35,8 +35,8 @@ pub struct Left<'d> {
     instead: Option<OpenSet>,
     /// Generic terms in its place, refitted, where those explain far more, with what the tangent said of them.
     swapped: Option<(Refitted<'d>, OpenSet)>,
-    /// The terms that are written into the simulation, and where they act.
-    written: Option<(String, Vec<TermRecord>)>,
+    /// What is written into the simulation, as it was refitted.
+    written: Option<CorrectionRecord>,
     /// Whether generic terms explain so much that the set is an imitation.
     pub foreign: bool,
     /// Whether the set is a sum of relaxations, which stands for a memory with many time scales.
@@ -125,14 +125,14 @@ impl<'d> Left<'d> {
         let (_, after) = block_score(setting, &best)?;
         let ratio = (after.iter().sum::<f64>() / before.iter().sum::<f64>()).sqrt();
         let better = ratio < 1.0;
-        let slot = of.record.slot.clone();
+        let record = CorrectionRecord { terms, ratio: finite(ratio), ..of.record.clone() };
         if replaced {
             // What stands in the set's place is told.
             let gain = best.log_evidence - pool[0].log_evidence - of.choice;
             self.instead = Some(OpenSet { gain, block_ratio: ratio, ..of });
         }
         let stands = (sure && better) || better_by_chance(&before, &after)? < BY_CHANCE;
-        self.written = (stands && !terms.is_empty()).then_some((slot, terms));
+        self.written = (stands && !record.terms.is_empty()).then_some(record);
         stands.then_some(best)
     }
 
@@ -152,16 +152,14 @@ impl<'d> Left<'d> {
         open.by_chance(ODDS_AGAINST) < self.alpha
     }
 
-    /// The correction, where it models something that is left and helps where it was not fitted, with what it says in words.
-    pub fn believed(self) -> Option<(CorrectionRecord, Option<String>)> {
+    /// The correction, as it is written, or where it models something that is left and helps where it was not fitted, with what it says in words.
+    pub fn believed(mut self) -> Option<(CorrectionRecord, Option<String>)> {
+        let written = self.written.take();
         let wanted = self.imperfect || self.test.is_none();
-        let open = self.told().filter(|o| wanted && self.stands(o))?;
-        let mut record = CorrectionRecord { ratio: finite(open.block_ratio), ..open.record.clone() };
-        let words = open.words.clone();
-        // What is written is told as it is written.
-        if let Some((slot, terms)) = self.written {
-            (record.slot, record.terms) = (slot, terms);
-        }
+        let open = self.told().filter(|o| wanted && self.stands(o));
+        let words = open.and_then(|o| o.words.clone());
+        let record =
+            written.or_else(|| open.map(|o| CorrectionRecord { ratio: finite(o.block_ratio), ..o.record.clone() }))?;
         Some((record, words))
     }
 }
@@ -186,6 +184,9 @@ fn in_place<'d>(
         .chain(generic.filter(likely))
         .filter_map(|o| {
             let terms = Writable::Sparse(o.sparse()?.within(none.base.document()));
+            if search.setting.budget.omits(Step::Imitation) {
+                return None;
+            }
             Some((fitted(&search.setting, none, &terms)?, o.clone()))
         })
         .filter(|swapped| lead(swapped) > FAR_MORE)

@@ -221,6 +221,8 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
         })
         .unzip();
     let phi = Matrix::from_columns(&columns)?;
+    // Hundreds of columns of a long recording, twice, are most of the memory of a diagnosis.
+    drop(columns);
     let options = Selecting { criterion: Criterion::SearchedPress, max_terms: MOST_TERMS, ..Selecting::default() };
     let selection = select(&phi, &r, &options).ok()?;
     if selection.terms.is_empty() {

@@ -1,7 +1,7 @@
 //! Whether a parameter wanders or oscillates where an effect of a set says that it changes once, drifts or follows a temperature.
 //!
-//! Each of these takes a good part of what a parameter does that never rests, and beside one another they imitate it well. A parameter that varies is not
-//! of the catalogue: it is heard as a rival of each such effect, around the set without that effect.
+//! Each of these takes a good part of what a parameter does that never rests. Such a parameter is not of the catalogue: it is heard as a rival of each of
+//! these effects, around the set without that effect.
 
 use super::{noises, varying};
 use crate::answer::text::number;
@@ -42,7 +42,8 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
             return None;
         }
         let key = best.key_without(member);
-        let rest = pool.iter().find(|h| h.key() == key)?;
+        let rest = pool.iter().filter(|h| h.key() == key);
+        let rest = rest.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
         let kind = search.setting.noise;
         let found = varying(&rest.base, kind, &noises(&rest.base, kind))?;
         // What varies has paid for the parameters among which it was found; a moment was looked for too.

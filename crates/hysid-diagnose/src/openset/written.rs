@@ -48,10 +48,11 @@ impl Sparse {
         Self { simulation, members: self.members.iter().map(bare).collect() }
     }
 
-    /// As they were fitted, with those of another one beside them.
+    /// As they were fitted, with those of another one beside them that are not among them.
     pub fn with(&self, fitted: &[Vec<f64>], others: &Self) -> Self {
         let mut members = self.at(fitted);
-        members.extend(others.members.iter().cloned());
+        let same = |a: &Member, b: &Member| a.term.place == b.term.place && a.term.text == b.term.text;
+        members.extend(others.members.iter().filter(|o| !self.members.iter().any(|m| same(m, o))).cloned());
         Self { simulation: self.simulation.clone(), members }
     }
 

@@ -34,6 +34,8 @@ pub enum Step {
     Blocks,
     /// The test of what remains.
     Remains,
+    /// Generic terms in the place of the effects.
+    Imitation,
     /// The search once more, from better parameters or with shorter steps.
     Again,
     /// A written correction without each of its terms; the verdict does not rest on it.
@@ -54,6 +56,7 @@ impl Step {
             Self::Rehearsal => "the second look on simulated recordings",
             Self::Blocks => "rivals on held-out blocks",
             Self::Remains => "the test of what remains",
+            Self::Imitation => "whether generic terms explain more than the effects",
             Self::Again => "the search once more, from better parameters or with shorter steps",
             Self::Terms => "whether each term of the correction is needed",
             Self::Experiment => "an experiment",
@@ -83,7 +86,7 @@ impl<'a> Budget<'a> {
     pub fn omits(&self, step: Step) -> bool {
         let share = match step {
             Step::Remains | Step::Drops => TESTS,
-            Step::Blocks | Step::Terms | Step::Experiment => WHOLE,
+            Step::Blocks | Step::Imitation | Step::Terms | Step::Experiment => WHOLE,
             _ => SEARCH,
         };
         let late = (self.expired)(share);
