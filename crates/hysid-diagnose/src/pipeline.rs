@@ -223,6 +223,12 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         .then_some("a memory with many time scales, a fractional element or a spectrum of relaxation times");
     let (correction, varying) = left.believed().unzip();
     file.correction = correction;
+    // What is not of the catalogue lives where the correction acts, not where an effect imitates it.
+    if let (VerdictKind::NotInCatalogue, Some(location), Some(c)) = (file.verdict, &mut file.location, &file.correction)
+    {
+        let (slot, block) = place_of(c);
+        (location.slot, location.block) = (slot, block.into());
+    }
     let varying = varying.flatten();
     file.notes.extend(varying.iter().map(|words| format!("what is left looks like something that varies: {words}")));
 

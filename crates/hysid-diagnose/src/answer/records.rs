@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hysid_plant::Simulation;
+use hysid_plant::{Expr, Simulation};
 
 use super::bootstrap::{ratio_of_rms, rms};
 use super::file::*;
@@ -10,7 +10,7 @@ use super::locate;
 use super::report_values::{reported, sentence};
 use crate::data::DataSet;
 use crate::evidence::{FeatureGroup, detectable_amplitude};
-use crate::mechanism::number_with_unit;
+use crate::mechanism::{Block, number_with_unit};
 use crate::model::base::Base;
 use crate::model::hold::FreeRun;
 use crate::request::{Question, words};
@@ -167,6 +167,29 @@ pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Cand
     })
 }
 
+/// The slot and the block at which a correction acts, by its loudest term: with memory, along a velocity (the state itself whose equation it enters, or an
+/// input that is called one), or along a position.
+pub fn place_of(correction: &CorrectionRecord) -> (String, &'static str) {
+    let slot = correction.slot.clone();
+    let own = slot.split_once(':').map_or("", |(_, own)| own);
+    let loudest = correction.terms.iter().max_by(|a, b| a.err.total_cmp(&b.err));
+    let symbols = loudest.and_then(|t| Expr::parse(&t.term).ok()).map(|e| e.symbols()).unwrap_or_default();
+    let block = if slot.starts_with("parameter:") {
+        Block::TimeVariation
+    } else if slot.starts_with("input:") {
+        Block::Input
+    } else if correction.signature.side == "output" {
+        Block::Output
+    } else if correction.signature.memory != "none" {
+        Block::Hysteresis
+    } else if symbols.iter().any(|s| s == own || s.starts_with('v')) {
+        Block::Damping
+    } else {
+        Block::Restoring
+    };
+    (slot, block.name())
+}
+
 pub fn fits(
     simulation: &Simulation,
     held: &DataSet,
@@ -305,4 +328,30 @@ pub fn answers(pool: &[Hypothesis<'_>], questions: &[Question]) -> Vec<String> {
             ))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_correction_has_the_place_of_its_loudest_term() {
+        let place = |slot: &str, side: &str, memory: &str, terms: &[(&str, f64)]| {
+            let terms = terms.iter().map(|(t, err)| TermRecord { term: (*t).into(), coefficient: 1.0, err: *err });
+            let signature = SignatureRecord {
+                memory: memory.into(),
+                rate_dependent: false,
+                symmetry: "odd".into(),
+                side: side.into(),
+            };
+            place_of(&CorrectionRecord { slot: slot.into(), terms: terms.collect(), signature, ratio: None }).1
+        };
+        assert_eq!(place("state:w", "plant", "none", &[("sin(2.5*q)*w", 0.9), ("q^3", 0.1)]), "damping");
+        assert_eq!(place("state:w", "plant", "none", &[("sin(2.5*q)*w", 0.1), ("q^3", 0.9)]), "restoring");
+        assert_eq!(place("state:w", "plant", "rate_independent", &[("play(q, 0.3)", 0.9)]), "hysteresis");
+        assert_eq!(place("output:force_N", "plant", "none", &[("abs(x)*v", 0.9)]), "damping");
+        assert_eq!(place("output:x_m", "output", "none", &[("y^2", 0.9)]), "output");
+        assert_eq!(place("input:u", "input", "none", &[("u^2", 0.9)]), "input");
+        assert_eq!(place("parameter:k", "time", "none", &[("k*sin(2.5*t)", 0.9)]), "time_variation");
+    }
 }

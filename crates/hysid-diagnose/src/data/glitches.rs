@@ -116,13 +116,16 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 mod tests {
-    use super::oscillator::normal;
+    use rand_distr::{Distribution, StandardNormal};
+
     use super::*;
+    use crate::random::generator;
+
+    fn normal(seed: u64) -> impl FnMut() -> f64 {
+        let mut rng = generator(seed, 0);
+        move || StandardNormal.sample(&mut rng)
+    }
 
     fn places(e: &[f64]) -> Vec<usize> {
         glitches(e, e).into_iter().map(|(n, _)| n).collect()

@@ -93,43 +93,36 @@ pub fn curves(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<Shape> {
         out.push(Shape::new(format!("max(-{n} - {name}, 0)"), Kind::Even, each(x, |v| (-g - v).max(0.0))));
     }
     if !velocity {
-        out.extend(memories(name, x));
+        out.extend(widths(x).map(|r| {
+            let play = |w: &mut f64, v: f64| {
+                *w = w.max(v - r).min(v + r);
+                *w
+            };
+            Shape::new(format!("play({name}, {})", number(r)), Kind::Play, in_turn(x, |first| first, play))
+        }));
     }
     out
 }
 
-/// Plays of a coordinate and relays that switch at the same distances.
-fn memories(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
-    let mut out = Vec::new();
-    for r in quantiles(x, WIDTHS).map(|q| WIDTH * q).into_iter().filter(|r| *r > 0.0) {
+/// Half widths of the plays of a coordinate, and distances at which its relays switch.
+fn widths(x: &[Vec<f64>]) -> impl Iterator<Item = f64> {
+    quantiles(x, WIDTHS).into_iter().map(|q| WIDTH * q).filter(|r| *r > 0.0)
+}
+
+/// Relays of a coordinate of the plant: a force that switches. No sensor does.
+pub fn relays(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
+    let of = |r: f64| {
+        let switch = |up: &mut f64, v: f64| {
+            if v.abs() > r {
+                *up = v.signum();
+            }
+            *up
+        };
         let n = number(r);
-        let play = in_turn(
-            x,
-            |first| first,
-            |w, v| {
-                *w = w.max(v - r).min(v + r);
-                *w
-            },
-        );
-        out.push(Shape::new(format!("play({name}, {n})"), Kind::Play, play));
         // As the operator has it: at rest it is down.
-        let relay = in_turn(
-            x,
-            |_| -1.0,
-            |up, v| {
-                *up = if v > r {
-                    1.0
-                } else if v < -r {
-                    -1.0
-                } else {
-                    *up
-                };
-                *up
-            },
-        );
-        out.push(Shape::new(format!("relay({name}, -{n}, {n})"), Kind::Play, relay));
-    }
-    out
+        Shape::new(format!("relay({name}, -{n}, {n})"), Kind::Play, in_turn(x, |_| -1.0, switch))
+    };
+    widths(x).map(of).collect()
 }
 
 /// What first-order lags of a coordinate leave of it: time constants of the length of the recording.

@@ -140,6 +140,9 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         for ((name, _, velocity), x) in coordinates.iter().zip(&series) {
             found.extend(shapes::curves(name, x, *velocity));
             if plant {
+                if !velocity {
+                    found.extend(shapes::relays(name, x));
+                }
                 found.extend(shapes::lags(name, x, data));
                 found.extend(shapes::changes(name, x, data));
             }
