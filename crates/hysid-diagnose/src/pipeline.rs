@@ -226,8 +226,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     // What is not of the catalogue lives where the correction acts, not where an effect imitates it.
     if let (VerdictKind::NotInCatalogue, Some(location), Some(c)) = (file.verdict, &mut file.location, &file.correction)
     {
-        let (slot, block) = place_of(c);
-        (location.slot, location.block) = (slot, block.into());
+        location.slot.clone_from(&c.slot);
+        location.block = block_of(c).name().into();
     }
     let varying = varying.flatten();
     file.notes.extend(varying.iter().map(|words| format!("what is left looks like something that varies: {words}")));

@@ -167,14 +167,14 @@ pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Cand
     })
 }
 
-/// The slot and the block at which a correction acts, by its loudest term: with memory, along a velocity (the state itself whose equation it enters, or an
+/// The block in which a correction acts, by its loudest term: with memory, along a velocity (the state itself whose equation it enters, or an
 /// input that is called one), or along a position.
-pub fn place_of(correction: &CorrectionRecord) -> (String, &'static str) {
-    let slot = correction.slot.clone();
+pub fn block_of(correction: &CorrectionRecord) -> Block {
+    let slot = &correction.slot;
     let own = slot.split_once(':').map_or("", |(_, own)| own);
     let loudest = correction.terms.iter().max_by(|a, b| a.err.total_cmp(&b.err));
     let symbols = loudest.and_then(|t| Expr::parse(&t.term).ok()).map(|e| e.symbols()).unwrap_or_default();
-    let block = if slot.starts_with("parameter:") {
+    if slot.starts_with("parameter:") {
         Block::TimeVariation
     } else if slot.starts_with("input:") {
         Block::Input
@@ -186,8 +186,7 @@ pub fn place_of(correction: &CorrectionRecord) -> (String, &'static str) {
         Block::Damping
     } else {
         Block::Restoring
-    };
-    (slot, block.name())
+    }
 }
 
 pub fn fits(
@@ -344,7 +343,7 @@ mod tests {
                 symmetry: "odd".into(),
                 side: side.into(),
             };
-            place_of(&CorrectionRecord { slot: slot.into(), terms: terms.collect(), signature, ratio: None }).1
+            block_of(&CorrectionRecord { slot: slot.into(), terms: terms.collect(), signature, ratio: None }).name()
         };
         assert_eq!(place("state:w", "plant", "none", &[("sin(2.5*q)*w", 0.9), ("q^3", 0.1)]), "damping");
         assert_eq!(place("state:w", "plant", "none", &[("sin(2.5*q)*w", 0.1), ("q^3", 0.9)]), "restoring");

@@ -10,8 +10,8 @@ use super::DataSet;
 use crate::answer::text::number;
 use crate::evidence::Series;
 
-/// Deviations from the mean of its neighbours, in standard deviations of what all samples have, beyond which a sample is none of them: once in a million
-/// samples of white noise.
+/// Deviations from the mean of its neighbours, in standard deviations of what all samples have, beyond which a sample is none of them: less than
+/// once in a million samples of white noise.
 const BEYOND: f64 = 5.0;
 /// Steps of a converter that a deviation must have besides.
 const LEVELS: f64 = 3.0;
@@ -23,6 +23,9 @@ const NORMAL: f64 = 1.4826;
 /// The data with glitches replaced by what their neighbours say of the error, with a note for each output; `None` where there are none.
 pub fn mended(simulation: &Simulation, data: &DataSet, residual: &[f64]) -> Option<DataSet> {
     let found = found(simulation, data, residual);
+    if found.is_empty() {
+        return None;
+    }
     let mut out = data.clone();
     for glitch in found.iter().flat_map(|(_, all)| all) {
         out.move_row(glitch.series, glitch.row, -glitch.deviation);
@@ -30,7 +33,7 @@ pub fn mended(simulation: &Simulation, data: &DataSet, residual: &[f64]) -> Opti
     out.notes.extend(
         words(simulation, data, &found).map(|w| format!("{w}: taken for glitches of the sensor, and replaced")),
     );
-    (!found.is_empty()).then_some(out)
+    Some(out)
 }
 
 /// Sentences about glitches in data that only score, where they stay.

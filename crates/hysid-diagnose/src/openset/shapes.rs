@@ -5,12 +5,26 @@ use std::f64::consts::TAU;
 
 use hysid_plant::{Expr, Function};
 
-use super::terms::Kind;
 use crate::answer::text::number;
 use crate::data::DataSet;
 
 /// Samples of a signal by stretch.
 pub type Series = Vec<Vec<f64>>;
+
+/// What a generic term is a function of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// An odd function of its coordinate.
+    Odd,
+    /// An even or one-sided one.
+    Even,
+    /// A play.
+    Play,
+    /// What a lag leaves.
+    Lag,
+    /// Something that changes over the record.
+    Time,
+}
 
 /// A shape with its samples.
 pub struct Shape {

@@ -1,6 +1,7 @@
 //! The signature of a correction: what the families of generic signals say of memory, rate, symmetry and side.
 
-use super::terms::{Kind, Term};
+use super::shapes::Kind;
+use super::terms::Term;
 use crate::answer::file::SignatureRecord;
 use crate::evidence::{FeatureGroup, Projector, Whitener, norm2, score};
 use crate::model::base::Base;

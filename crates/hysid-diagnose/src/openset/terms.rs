@@ -6,7 +6,7 @@ use std::sync::Arc;
 use hysid_plant::{Expr, Slot as Place};
 use rayon::prelude::*;
 
-use super::shapes::{self, Series, Shape, held_beyond};
+use super::shapes::{self, Kind, Series, Shape, held_beyond};
 use crate::model::base::Base;
 use crate::search::screen::along;
 use crate::slot::Structure;
@@ -31,21 +31,6 @@ pub struct Coordinate {
     pub meaning: Expr,
     /// The same, held at the ends of the range that was seen of it.
     pub held: Expr,
-}
-
-/// What a generic term is a function of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
-    /// An odd function of its coordinate.
-    Odd,
-    /// An even or one-sided one.
-    Even,
-    /// A play.
-    Play,
-    /// What a lag leaves.
-    Lag,
-    /// Something that changes over the record.
-    Time,
 }
 
 /// One generic signal at one place.
