@@ -318,6 +318,43 @@ fn bounds_hold_and_are_flagged() {
     assert_ne!(local, Settings::default());
 }
 
+/// A valve's stem settles within a hundredth of a sampling period; the damping that fits lies far beyond what the steps bear that suit the user's.
+#[test]
+fn a_stiff_simulation_is_followed_to_where_its_steps_would_explode() {
+    let text = r#"
+[time]
+period_s = 0.01
+[inputs]
+p = "u_N"
+[parameters]
+k = { value = 2.2e5, min = 5.0e4, max = 1.0e6 }
+c = { value = 2000.0, min = 200.0, max = 20000.0 }
+[states]
+x = { derivative = "v", initial = 0.0 }
+v = { derivative = "(p - k*x - c*v)/2", initial = 0.0 }
+[outputs]
+x_m = "x"
+"#;
+    let (k, c) = (2.5e5, 9000.0);
+    let input: Vec<f64> = steps(1500, 2000.0);
+    // So heavily damped that the mass does not show: a lag of c/k, in closed form where the input is linear between samples.
+    let (tau, mut x) = (c / k, 0.0);
+    let decay = (-0.01_f64 / tau).exp();
+    let mut y = vec![x];
+    for w in input.windows(2) {
+        let slope = (w[1] - w[0]) / 0.01;
+        x = (w[1] - slope * tau) / k + decay * (x - (w[0] - slope * tau) / k);
+        y.push(x);
+    }
+    let compiled = compile(text);
+    let drive = Drive::new(0.0, 0.01, input.len(), vec![input]).expect("valid");
+    let data = Data::new(&compiled, "valve", drive, vec![y]).expect("valid");
+    let c_found = compiled.calibrate(&[data], &Settings { gls_rounds: 0, ..Settings::default() }).expect("calibrates");
+    assert!((c_found.theta[0] / k - 1.0).abs() < 0.01, "{:?}", c_found.theta);
+    assert!((c_found.theta[1] / c - 1.0).abs() < 0.05, "{:?}", c_found.theta);
+    assert!(c_found.steps.substeps > 8, "{:?}", c_found.steps);
+}
+
 #[test]
 fn too_little_data_is_an_error() {
     let compiled = compile(RESONANT);

@@ -95,11 +95,19 @@ impl Compiled {
             // The step that suited the user's parameters may not suit these.
             let now = check(&objective.theta(&p));
             let finer = now.substeps > steps.substeps;
-            steps = if finer { now } else { crate::engine::StepCheck { substeps: steps.substeps, ..now } };
-            if !finer {
+            let substeps = if finer {
+                now.substeps
+            } else if objective.cramped(&p, &lower, &upper) {
+                2 * steps.substeps
+            } else {
+                steps.substeps
+            };
+            let ended = substeps == steps.substeps;
+            steps = crate::engine::StepCheck { substeps, ..now };
+            if ended {
                 break best;
             }
-            objective.substeps = steps.substeps;
+            objective.substeps = substeps;
         };
         let plain = self.rmse(data, &objective.simulate(&p));
         for _ in 0..settings.gls_rounds {
@@ -246,7 +254,8 @@ impl Compiled {
         let mut flags = Vec::new();
         for (&i, deviation) in result.estimated.iter().zip(result.standard_deviations()) {
             let (Some(p), Some(&value)) = (self.parameters().get(i), result.theta.get(i)) else { continue };
-            let near = 1e-6 * (p.upper() - p.lower()).min(1e300);
+            let span = p.upper() - p.lower();
+            let near = 1e-6 * if span.is_finite() { span } else { value.abs() };
             for bound in [p.lower(), p.upper()] {
                 if bound.is_finite() && (value - bound).abs() <= near {
                     flags.push(Flag::AtBound { parameter: i, bound });

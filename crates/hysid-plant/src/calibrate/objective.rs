@@ -3,7 +3,10 @@
 use super::Data;
 use super::least_squares::Normal;
 use super::noise::NoiseModel;
-use crate::engine::{Compiled, Direction, Observer, Run, Start};
+use crate::engine::{Compiled, Direction, MOST_STEPS, Observer, Run, Start};
+
+/// How far around a point the border of stability is looked for, parameter by parameter.
+const NEAR: [f64; 2] = [0.8, 1.25];
 
 /// What the variables of a minimisation are: estimated parameters, then each stretch's free initial states.
 pub(crate) struct Objective<'a> {
@@ -83,6 +86,30 @@ impl Objective<'_> {
         }
         let finite = total.cost.is_finite() && total.gradient.iter().chain(&total.hessian).all(|x| x.is_finite());
         finite.then_some(total)
+    }
+
+    /// Whether a descent may have come to the border beyond which a stiff simulation explodes for want of steps: near the point it does, and with twice as
+    /// many steps it does not.
+    pub fn cramped(&mut self, p: &[f64], lower: &[f64], upper: &[f64]) -> bool {
+        if 2 * self.substeps > MOST_STEPS {
+            return false;
+        }
+        let explodes = |o: &Self, q: &[f64]| o.simulate(q).iter().any(|r| r.diverged.is_some());
+        let points = (0..self.estimated.len()).flat_map(|i| NEAR.map(|factor| (i, factor)));
+        for (i, factor) in points {
+            let mut q = p.to_vec();
+            q[i] = (factor * q[i]).clamp(lower[i], upper[i]);
+            self.simulations += 1;
+            if explodes(self, &q) {
+                self.substeps *= 2;
+                let cured = !explodes(self, &q);
+                self.substeps /= 2;
+                if cured {
+                    return true;
+                }
+            }
+        }
+        false
     }
 
     /// Simulated outputs of every stretch at a point (`[stretch][output][sample]`), without correction.

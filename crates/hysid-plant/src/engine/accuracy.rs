@@ -5,7 +5,7 @@ use super::drive::Drive;
 use super::run::{Run, Start};
 
 /// Most steps in one sampling period that are tried.
-const MOST: usize = 64;
+pub const MOST_STEPS: usize = 64;
 
 /// The result of a step-halving check.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +28,7 @@ impl Compiled {
         }
         let short = drive.shortened(2000);
         let outputs = |substeps| self.simulate(&Run::new(&short, theta).from(start).with_substeps(substeps));
-        let mut best = StepCheck { substeps: MOST, error: f64::NAN };
+        let mut best = StepCheck { substeps: MOST_STEPS, error: f64::NAN };
         let mut known: Vec<(usize, super::Response)> = Vec::new();
         for substeps in [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64] {
             for wanted in [substeps, 2 * substeps] {

@@ -20,6 +20,7 @@ mod surface;
 mod trajectory;
 mod vector;
 
+pub(crate) use accuracy::MOST_STEPS;
 pub use accuracy::StepCheck;
 pub use compile::Compiled;
 pub use drive::{DataError, Drive};
