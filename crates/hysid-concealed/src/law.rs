@@ -123,11 +123,6 @@ laws! {
 }
 
 impl Law {
-    /// The law of the catalogue with this name that the generator draws first.
-    pub fn by_name(name: &str) -> Option<Law> {
-        Law::ALL.iter().copied().find(|l| l.name() == name)
-    }
-
     /// Whether the law is dry friction with a hard sign, that sticks.
     pub fn sticks(self) -> bool {
         matches!(

@@ -41,6 +41,7 @@ pub use answer::bootstrap::{Ratio, ratio_of_rms, rms};
 pub use column::{StandIn, stand_in};
 pub use data::{DataSet, Stretch, held_out_blocks};
 pub use error::DiagnoseError;
+pub use model::base::Interval;
 pub use model::{Model, Outputs, Unknown, Values};
 pub use pipeline::{Diagnosis, diagnose};
 pub use request::{Hooks, Options, Question, Request};

@@ -77,7 +77,7 @@ fn picture() -> Picture {
             before: vec![0.1, 0.8, 0.5],
             after: Some(vec![0.0, 1.01, 0.4]),
             noise_rms: 0.01,
-            held_out_s: vec![],
+            every: 1,
         }],
         maps: vec![MapPicture {
             output: "q_m".into(),

@@ -103,6 +103,15 @@ impl Recording {
         self.clock
     }
 
+    /// Whether another recording holds the same samples under the same names, missing ones included.
+    pub fn same_samples(&self, other: &Self) -> bool {
+        let same = |a: &Channel, b: &Channel| {
+            a.name == b.name && a.samples.iter().map(|x| x.to_bits()).eq(b.samples.iter().map(|x| x.to_bits()))
+        };
+        self.channels.len() == other.channels.len()
+            && self.channels.iter().zip(&other.channels).all(|(a, b)| same(a, b))
+    }
+
     /// Number of samples in each channel.
     pub fn len(&self) -> usize {
         self.channels.first().map_or(0, |c| c.samples.len())

@@ -93,7 +93,7 @@ impl Verdict {
                 let (b, a) = own_fit.unwrap_or((0.0, 0.0));
                 own_fit = Some((b + before * before, a + after * after));
                 if let Some(black) = f["rmse_black_box"].as_f64() {
-                    own_black_box = Some(black / after);
+                    own_black_box = Some(own_black_box.map_or(black / after, |least: f64| least.min(black / after)));
                 }
             }
         }

@@ -6,7 +6,7 @@ use hysid_signal::power_spectrum;
 use super::picture::{LawPicture, MapPicture, ParameterPicture, Picture, RecordPicture, Role, SpectrumPicture};
 use crate::data::DataSet;
 use crate::mechanism::Block;
-use crate::model::base::Base;
+use crate::model::base::{Base, Interval};
 use crate::model::hold::FreeRun;
 use crate::search::hypothesis::Hypothesis;
 use crate::search::screen::along;
@@ -92,7 +92,7 @@ fn records(
                 before: Vec::new(),
                 after: after.map(|_| Vec::new()),
                 noise_rms: s.noise.get(o).copied().unwrap_or(0.0),
-                held_out_s: Vec::new(),
+                every: data.step,
             };
             for series in mine {
                 if let (Some(&time), Some(&sample)) = (picture.time_s.last(), picture.samples.last()) {
@@ -106,7 +106,7 @@ fn records(
                 }
                 picture.time_s.extend(data.time_of_rows(series));
                 let first = data.stretches[series.stretch].samples.start + series.first;
-                picture.samples.extend(first..first + series.rows.len());
+                picture.samples.extend((0..series.rows.len()).map(|n| first + n * data.step));
                 match scored {
                     Some(scored) => picture.scored.extend_from_slice(&scored[series.rows.clone()]),
                     None => picture.scored.resize(picture.time_s.len(), false),
@@ -272,15 +272,16 @@ fn laws(s: &Sitting<'_, '_>) -> Vec<LawPicture> {
 fn parameters(s: &Sitting<'_, '_>, found: bool) -> Vec<ParameterPicture> {
     let before = s.none.base.intervals();
     let after = if found { s.best.base.intervals() } else { Vec::new() };
-    let find =
-        |list: &[(String, f64, f64, f64, bool)], name: &str| list.iter().find(|p| p.0 == name).map(|p| [p.1, p.2, p.3]);
-    let names = before.iter().chain(after.iter().filter(|a| before.iter().all(|b| b.0 != a.0))).map(|p| p.0.clone());
+    let find = |list: &[Interval], name: &str| list.iter().find(|p| p.name == name).cloned();
+    let brought = after.iter().filter(|a| before.iter().all(|b| b.name != a.name));
+    let names = before.iter().chain(brought).map(|p| p.name.clone());
     names
         .map(|name| {
             let given = s.simulation.parameter(&name);
             let document = s.best.base.model.simulation();
             let unit = document.parameter(&name).and_then(|p| p.unit.as_ref()).map(ToString::to_string);
-            let bound = |list: &[(String, f64, f64, f64, bool)]| list.iter().any(|p| p.0 == name && p.4);
+            let (before, after) = (find(&before, &name), find(&after, &name));
+            let bound = |i: &Option<Interval>| i.as_ref().is_some_and(|i| i.at_bound);
             let remark = match (bound(&before), bound(&after)) {
                 (_, true) => "at a bound",
                 (true, false) if found => "at a bound before",
@@ -290,8 +291,8 @@ fn parameters(s: &Sitting<'_, '_>, found: bool) -> Vec<ParameterPicture> {
             ParameterPicture {
                 unit: unit.unwrap_or_default(),
                 given: given.map(|p| p.value),
-                before: find(&before, &name),
-                after: find(&after, &name),
+                before,
+                after,
                 remark: remark.into(),
                 name,
             }

@@ -2,6 +2,8 @@
 //!
 //! Every series of one entry has the same length. A sample that is missing or was not simulated is `NaN`.
 
+use crate::model::base::Interval;
+
 /// All that a report of one diagnosis shows beside the verdict itself.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Picture {
@@ -46,8 +48,8 @@ pub struct RecordPicture {
     pub after: Option<Vec<f64>>,
     /// Estimated rms of the noise.
     pub noise_rms: f64,
-    /// Intervals of time, in seconds, that were held out as blocks.
-    pub held_out_s: Vec<[f64; 2]>,
+    /// Samples from one entry to the next: more than one where an entry is a mean over so many.
+    pub every: usize,
 }
 
 /// What a recording was used for.
@@ -119,10 +121,10 @@ pub struct ParameterPicture {
     pub unit: String,
     /// The user's value; `None` for a parameter that an effect brought.
     pub given: Option<f64>,
-    /// The value after calibration without the effects, with its 95 % interval.
-    pub before: Option<[f64; 3]>,
-    /// The value with the effects: value, low, high.
-    pub after: Option<[f64; 3]>,
+    /// As it was calibrated without the effects.
+    pub before: Option<Interval>,
+    /// As it was fitted with the effects.
+    pub after: Option<Interval>,
     /// A remark, such as that it lies at a bound.
     pub remark: String,
 }

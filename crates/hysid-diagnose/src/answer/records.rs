@@ -11,7 +11,7 @@ use super::report_values::{reported, sentence};
 use crate::data::DataSet;
 use crate::evidence::{FeatureGroup, detectable_amplitude};
 use crate::mechanism::{Block, number_with_unit};
-use crate::model::base::Base;
+use crate::model::base::{Base, Interval};
 use crate::model::hold::FreeRun;
 use crate::request::{Question, words};
 use crate::search::hypothesis::{Effect, Hypothesis};
@@ -19,6 +19,7 @@ use crate::search::screen::Candidate;
 use crate::verdict::Support;
 use crate::verdict::weigh::Contest;
 
+/// Values of the outputs by their columns.
 pub fn by_column(simulation: &Simulation, values: &[f64]) -> BTreeMap<String, f64> {
     simulation.outputs.iter().map(|o| o.column.clone()).zip(values.iter().copied()).collect()
 }
@@ -127,7 +128,7 @@ pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<Alterna
     out
 }
 
-/// Where the strongest effect of the best set shows.
+/// Where the first effect of the best set (the one that was found first) shows; without effects, where the likeliest candidate does.
 pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Candidate]) -> Option<LocationRecord> {
     let effect = best.effects.first();
     let candidate = match effect {
@@ -189,6 +190,7 @@ pub fn block_of(correction: &CorrectionRecord) -> Block {
     }
 }
 
+/// Free-run errors on the hold-out by recording and output, `before` and `after` the effects; `blocks`: it is made of blocks of the estimation recordings.
 pub fn fits(
     simulation: &Simulation,
     held: &DataSet,
@@ -233,13 +235,16 @@ pub fn fits(
     out
 }
 
+/// The simulation's own parameters as they were fitted.
 pub fn calibrated(base: &Base<'_>, simulation: &Simulation) -> Vec<ParameterRecord> {
     base.intervals()
         .into_iter()
-        .filter_map(|(name, value, low, high, _)| {
-            let p = simulation.parameter(&name)?;
+        .filter_map(|i| {
+            let p = simulation.parameter(&i.name)?;
             let unit = p.unit.as_ref().map(ToString::to_string).unwrap_or_default();
-            Some(ParameterRecord { name, value, low: finite(low), high: finite(high), unit })
+            let (low, high) = i.low_and_high();
+            let (low, high) = (low.and_then(finite), high.and_then(finite));
+            Some(ParameterRecord { name: i.name, value: i.value, low, high, unit })
         })
         .collect()
 }
@@ -247,14 +252,14 @@ pub fn calibrated(base: &Base<'_>, simulation: &Simulation) -> Vec<ParameterReco
 /// Parameters of the calibrated simulation that stand at a bound or far from what the user gave.
 pub fn absorbing(base: &Base<'_>, simulation: &Simulation) -> Vec<String> {
     let mut out = Vec::new();
-    for (name, value, low, high, at_bound) in base.intervals() {
+    for Interval { name, value, ends, at_bound } in base.intervals() {
         let Some(p) = simulation.parameter(&name) else { continue };
         let unit = p.unit.as_ref();
         if at_bound {
             out.push(format!("parameter `{name}` of the recalibrated simulation stands at a bound ({}): it may be absorbing something", number_with_unit(value, unit)));
         } else if p.value != 0.0
             && (value / p.value > 2.0 || value / p.value < 0.5)
-            && (p.value < low || p.value > high)
+            && ends.is_none_or(|[low, high]| p.value < low || p.value > high)
         {
             out.push(format!(
                 "parameter `{name}` of the recalibrated simulation is {}, the file says {}",

@@ -77,9 +77,9 @@ pub fn reported(base: &Base<'_>, effect: &Effect) -> Vec<ParameterRecord> {
                 }
             }
             // What no unknown moves was read from the recording or chosen from a grid: nothing tells how well it is known.
-            let fitted = gradient.iter().any(|g| *g != 0.0);
-            let half = 1.96 * variance.max(0.0).sqrt();
-            let end = |x: f64| finite(x).filter(|_| fitted);
+            // Nor does anything where all that moves it stands at a bound.
+            let half = 1.96 * variance.sqrt();
+            let end = |x: f64| finite(x).filter(|_| variance > 0.0);
             ParameterRecord {
                 name: r.name.clone(),
                 value,

@@ -2,7 +2,6 @@
 
 use super::global::starts;
 use crate::error::DiagnoseError;
-use crate::evidence::norm2;
 use crate::model::base::Base;
 use crate::model::{Model, Values};
 use crate::request::Request;
@@ -24,7 +23,7 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
     setting.substeps = substeps;
     for from in froms {
         let Some(b) = setting.fit(simulation, &from, None, 1, 25) else { continue };
-        let cost = |b: &Base<'_>| norm2(&b.fit.residual);
+        let cost = |b: &Base<'_>| setting.data.relative_squares(&b.fit.residual);
         if best.as_ref().is_none_or(|x| cost(&b) < cost(x)) {
             best = Some(b);
         }
@@ -35,10 +34,10 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
         return Err(DiagnoseError::Explodes {
             file: request.file.to_owned(),
             recording: setting.data.recordings[s.recording].clone(),
-            at_s: s.start_s + sample as f64 * setting.data.period_s,
+            at_s: s.start_s + sample as f64 * s.drive.period_s(),
         });
     };
-    let rms = |b: &Base<'_>| norm2(&b.fit.residual).sqrt();
+    let rms = |b: &Base<'_>| setting.data.relative_squares(&b.fit.residual).sqrt();
     // Under its own noise, twice.
     let polished = setting.further(&best, Some(&best.whitener), 2, 20);
     Ok(match polished {

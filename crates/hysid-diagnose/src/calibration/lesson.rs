@@ -131,7 +131,7 @@ pub fn lesson<'d>(
 /// The simulation without effects, fitted from where its parameters are beside those of a set; `None` where that leaves a much larger plain error.
 fn returned<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, h: &Hypothesis<'d>) -> Option<Base<'d>> {
     let b = setting.fit(&setting.original, &h.base.values(), Some(&none.base.whitener), 2, 20)?;
-    let error = |b: &Base<'_>| norm2(&b.fit.residual);
+    let error = |b: &Base<'_>| setting.data.relative_squares(&b.fit.residual);
     (b.driven() || error(&b) < WORSE.powi(2) * error(&none.base)).then_some(b)
 }
 
@@ -143,14 +143,15 @@ fn enough(setting: &Setting<'_>, h: &Hypothesis<'_>) -> usize {
         let m = Model::new(h.base.model.simulation(), setting.data, substeps).ok()?;
         m.predict(&m.theta(&values))
     };
-    let Some(exact) = predicted(2 * MOST_SUBSTEPS) else { return now };
-    let wanted = [now, 2 * now, 4 * now].into_iter().map(|s| s.min(MOST_SUBSTEPS)).find(|&s| {
+    let most = MOST_SUBSTEPS.max(now);
+    let Some(exact) = predicted(2 * most) else { return now };
+    let wanted = [now, 2 * now, 4 * now].into_iter().map(|s| s.min(most)).find(|&s| {
         predicted(s).is_none_or(|p| {
             let off: Vec<f64> = p.iter().zip(&exact).map(|(a, b)| a - b).collect();
             0.5 * norm2(&h.base.whitener.apply(&setting.data.layout, &off)) < ERROR
         })
     });
-    wanted.unwrap_or(MOST_SUBSTEPS).max(now)
+    wanted.unwrap_or(most)
 }
 
 #[cfg(test)]

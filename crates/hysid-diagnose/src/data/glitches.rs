@@ -20,7 +20,7 @@ const MOST: f64 = 0.02;
 /// Standard deviation of a normal variable over its median size.
 const NORMAL: f64 = 1.4826;
 
-/// The data with glitches replaced by what their neighbours say of the error, with a note for each output; `None` where there are none.
+/// The data (each row a sample) with glitches replaced by what their neighbours say of the error, with a note for each output; `None` where there are none.
 pub fn mended(simulation: &Simulation, data: &DataSet, residual: &[f64]) -> Option<DataSet> {
     let found = found(simulation, data, residual);
     if found.is_empty() {
@@ -28,7 +28,7 @@ pub fn mended(simulation: &Simulation, data: &DataSet, residual: &[f64]) -> Opti
     }
     let mut out = data.clone();
     for glitch in found.iter().flat_map(|(_, all)| all) {
-        out.move_row(glitch.series, glitch.row, -glitch.deviation);
+        out.move_sample(glitch.series, glitch.row, -glitch.deviation);
     }
     out.notes.extend(
         words(simulation, data, &found).map(|w| format!("{w}: taken for glitches of the sensor, and replaced")),

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use super::{DataSet, held_out_blocks};
 use crate::error::DiagnoseError;
+use crate::mechanism::mechanism;
 use crate::request::{Hooks, Request};
+use crate::slot::Structure;
 
 /// Most samples that the search works on as they are. What a simulation remembers at the start of a window is unknown, so that only a recording that
 /// no search can afford is cut.
@@ -15,8 +17,8 @@ const MOST_IN_WINDOWS: usize = 12_000;
 
 /// What a diagnosis works on.
 pub struct Intake {
-    /// To calibrate, search and judge on: in windows where the recordings are long, with fewer rows where the outputs are slow.
-    pub data: DataSet,
+    /// To calibrate, search and judge on: in windows where the recordings are long, each row a sample.
+    pub whole: DataSet,
     /// The hold-out: scores, and nothing else.
     pub held: DataSet,
     /// What was done to the recordings, for people.
@@ -38,6 +40,7 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
     }
     let simulation = request.simulation;
     dead_outputs(request)?;
+    questions(request)?;
     (hooks.progress)("reading the recordings");
     let free = simulation.parameters.iter().filter(|p| !p.fixed).count();
     let all = DataSet::new(simulation, request.estimation, free)?;
@@ -47,7 +50,7 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
         if let Some(same) = request
             .holdout
             .iter()
-            .find(|h| request.estimation.iter().any(|e| e.channels() == h.channels() && e.clock() == h.clock()))
+            .find(|h| request.estimation.iter().any(|e| e.same_samples(h) && e.clock() == h.clock()))
         {
             return Err(DiagnoseError::SameData(same.name().to_owned()));
         }
@@ -57,10 +60,22 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
     if request.holdout.is_empty() {
         notes.push("no hold-out recording was given: blocks of the recordings were held out and score the fit".into());
     }
-    let windowed = (full.samples() > MOST_WHOLE).then(|| full.within(MOST_IN_WINDOWS));
-    let data = windowed.as_ref().unwrap_or(&full).thinned();
-    notes.extend(data.notes.iter().filter(|n| !full.notes.contains(n)).cloned());
-    Ok(Intake { data, held, notes })
+    let whole = if full.samples() > MOST_WHOLE { full.within(MOST_IN_WINDOWS) } else { full };
+    let fresh: Vec<String> = whole.notes.iter().filter(|n| !notes.contains(n)).cloned().collect();
+    notes.extend(fresh);
+    Ok(Intake { whole, held, notes })
+}
+
+/// What is asked must be of the catalogue, and the simulation must have a place for it.
+fn questions(request: &Request<'_>) -> Result<(), DiagnoseError> {
+    let structure = Structure::of(request.simulation);
+    let is_possible = |id: &str, label: &str| {
+        mechanism(id).is_some_and(|m| structure.slots.iter().any(|s| s.label == label && m.fits(s)))
+    };
+    match request.questions.iter().flatten().find(|(id, label)| !is_possible(id, label)) {
+        Some((id, label)) => Err(DiagnoseError::Question(format!("{id}@{label}"))),
+        None => Ok(()),
+    }
 }
 
 /// An output that nothing moves cannot be diagnosed.

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use hysid_plant::Drive;
 
-use crate::evidence::{Layout, Series};
+use crate::evidence::{Layout, Series, norm2};
 
 use thinning::{step, thin};
 pub use windows::held_out_blocks;
@@ -25,6 +25,8 @@ pub use windows::held_out_blocks;
 const SHORTEST_STRETCH: usize = 24;
 /// Rows of one output shorter than this between gaps are left out.
 const SHORTEST_SERIES: usize = 8;
+/// Share of the samples that thinning must leave in series.
+const KEPT: f64 = 0.9;
 
 /// A run of samples without a missing input.
 #[derive(Debug, Clone)]
@@ -136,12 +138,36 @@ impl DataSet {
         thin(&samples[series.first..=last], self.step)
     }
 
+    /// The stacked outputs, each less its mean.
+    pub fn about_means(&self) -> Vec<f64> {
+        let mut y = self.y.clone();
+        for output in 0..self.layout.outputs {
+            let series = || self.layout.series.iter().filter(move |s| s.output == output);
+            let count: usize = series().map(|s| s.rows.len()).sum();
+            let mean = series().flat_map(|s| &self.y[s.rows.clone()]).sum::<f64>() / count.max(1) as f64;
+            series().for_each(|s| y[s.rows.clone()].iter_mut().for_each(|y| *y -= mean));
+        }
+        y
+    }
+
+    /// The unit in which errors of each output are compared with those of others: its rms about its mean, one where it does not vary.
+    pub fn scales(&self) -> Vec<f64> {
+        let rms = self.layout.rms(&self.about_means());
+        rms.into_iter().map(|s| if s > 0.0 && s.is_finite() { s } else { 1.0 }).collect()
+    }
+
+    /// Sum of squares of a stack, each output in units of [`Self::scales`].
+    pub fn relative_squares(&self, stack: &[f64]) -> f64 {
+        let scales = self.scales();
+        self.layout.series.iter().map(|s| norm2(&stack[s.rows.clone()]) / scales[s.output].powi(2)).sum()
+    }
+
     /// Time from one row to the next, in seconds.
     pub fn row_period_s(&self) -> f64 {
         self.period_s * self.step as f64
     }
 
-    /// Time of a row, in seconds, with the recording that it is from.
+    /// Times of the rows of a series, in seconds.
     pub fn time_of_rows(&self, series: &Series) -> impl Iterator<Item = f64> + '_ {
         let start = self.stretches[series.stretch].start_s;
         let (first, step) = (series.first, self.step);
@@ -164,20 +190,33 @@ impl DataSet {
 
     /// Samples for each row that the outputs need.
     pub fn own_step(&self) -> usize {
-        let outputs = self.stretches.iter().flat_map(|s| s.outputs.iter().map(Vec::as_slice));
-        step(outputs, self.period_s, self.samples())
+        let outputs = || self.stretches.iter().flat_map(|s| s.outputs.iter().map(Vec::as_slice));
+        let wanted = step(outputs(), self.period_s, self.samples());
+        // Between gaps there must be rows enough: what is too short for a series is left out.
+        let lengths: Vec<usize> =
+            outputs().flat_map(|y| runs(y.iter().map(|v| v.is_finite()))).map(|r| r.len()).collect();
+        let in_rows = |step: usize| -> usize {
+            lengths
+                .iter()
+                .map(|n| n.div_ceil(step))
+                .filter(|rows| *rows >= SHORTEST_SERIES)
+                .map(|rows| rows * step)
+                .sum()
+        };
+        let most = in_rows(1) as f64;
+        (2..=wanted).rev().find(|step| in_rows(*step) as f64 >= KEPT * most).unwrap_or(1)
     }
 
     /// The same data with as few rows as its signals need.
-    pub fn thinned(&self) -> Self {
+    pub fn thinned(&self) -> Cow<'_, Self> {
         let step = self.own_step();
         if step == 1 {
-            return self.clone();
+            return Cow::Borrowed(self);
         }
         let mut notes = self.notes.clone();
         notes.push(format!("means of the outputs over {step} samples are compared: nothing in them moves faster"));
-        let stretches = self.stretches.clone();
-        Self::from_stretches(self.period_s, self.recordings.clone(), stretches, self.layout.outputs, notes, step)
+        let (recordings, stretches) = (self.recordings.clone(), self.stretches.clone());
+        Cow::Owned(Self::from_stretches(self.period_s, recordings, stretches, self.layout.outputs, notes, step))
     }
 
     /// The first samples of each stretch (this share of them), those included that are held out elsewhere.
@@ -201,14 +240,12 @@ impl DataSet {
         out
     }
 
-    /// Moves a measured row of a series, and the sample that it is.
-    fn move_row(&mut self, series: &Series, n: usize, by: f64) {
+    /// Moves a measured sample of a series, where each row is one.
+    fn move_sample(&mut self, series: &Series, n: usize, by: f64) {
         self.y[series.rows.start + n] += by;
-        if self.step == 1 {
-            let stretch = &mut self.stretches[series.stretch];
-            stretch.outputs[series.output][series.first + n] += by;
-            Arc::make_mut(&mut stretch.recorded)[series.output][series.first + n] += by;
-        }
+        let stretch = &mut self.stretches[series.stretch];
+        stretch.outputs[series.output][series.first + n] += by;
+        Arc::make_mut(&mut stretch.recorded)[series.output][series.first + n] += by;
     }
 
     /// The same inputs with other measured outputs (in the order of the rows).

@@ -49,6 +49,8 @@ pub fn thin(x: &[f64], step: usize) -> Cow<'_, [f64]> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::DataSet;
+    use super::super::samples::{recording, simulation};
     use super::*;
 
     fn sine(cycles_a_sample: f64, n: usize) -> Vec<f64> {
@@ -83,6 +85,24 @@ mod tests {
             let last = (count - 1) * step;
             assert!((0..=last).all(|sample| rows_of(sample) == [(sample + step / 2) / step]), "{step}");
         }
+    }
+
+    #[test]
+    fn what_lies_between_many_gaps_is_not_thinned_away() {
+        let n = 20_000;
+        let set = |missing: &dyn Fn(usize) -> bool| {
+            let mut y = sine(0.002, n);
+            (0..n).filter(|i| missing(*i)).for_each(|i| y[i] = f64::NAN);
+            let mut simulation = simulation();
+            simulation.time.clock = hysid_plant::ClockSource::Period(1e-3);
+            DataSet::new(&simulation, &[recording(sine(0.002, n), y)], 1).unwrap()
+        };
+        assert_eq!(set(&|_| false).own_step(), 10);
+        let cut = set(&|i| i % 60 == 59);
+        assert!((2..=8).contains(&cut.own_step()), "{}", cut.own_step());
+        assert!(cut.thinned().rows() * cut.own_step() > 9 * n / 10);
+        // Fifteen samples make eight rows of two, and no series of fewer.
+        assert_eq!(set(&|i| i % 16 == 15).own_step(), 2);
     }
 
     #[test]

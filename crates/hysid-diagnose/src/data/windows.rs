@@ -7,6 +7,9 @@ use hysid_plant::Drive;
 use super::{DataSet, SHORTEST_STRETCH, Stretch};
 use crate::evidence::Layout;
 
+/// Most stretches that windows are taken from.
+const MOST_STRETCHES: usize = 8;
+
 impl DataSet {
     /// A data set of at most about `limit` samples: windows of equal length, the first and the last at the ends of the data and the loudest
     /// among them, so that thousands of simulations of a long recording stay affordable. The data set itself where it is short enough.
@@ -15,20 +18,34 @@ impl DataSet {
         if total <= limit {
             return self.clone();
         }
-        let windows = 4.max(self.stretches.len().min(8));
+        let windows = 4.max(self.stretches.len().min(MOST_STRETCHES));
         let length = (limit / windows).max(SHORTEST_STRETCH);
+        let scales = self.scales();
+        let loudness = |s: &Stretch, start: usize, length: usize| -> f64 {
+            let of = |(column, scale): (&Vec<f64>, &f64)| {
+                let v: Vec<f64> = column[start..start + length].iter().copied().filter(|v| v.is_finite()).collect();
+                let mean = v.iter().sum::<f64>() / v.len().max(1) as f64;
+                v.iter().map(|x| ((x - mean) / scale).powi(2)).sum::<f64>()
+            };
+            s.outputs.iter().zip(&scales).map(of).sum()
+        };
+        // Each stretch brings initial states that nobody knows: of many the longest are taken, and of those the loudest.
+        let mut taken: Vec<&Stretch> = self.stretches.iter().collect();
+        let worth = |s: &Stretch| (s.len().min(length), loudness(s, 0, s.len().min(length)));
+        taken.sort_by(|a, b| {
+            let ((long, loud), (short, quiet)) = (worth(b), worth(a));
+            long.cmp(&short).then(loud.total_cmp(&quiet))
+        });
+        taken.truncate(MOST_STRETCHES);
+        taken.sort_by_key(|s| (s.recording, s.samples.start));
+        let within: usize = taken.iter().map(|s| s.len()).sum();
         let mut chosen: Vec<Stretch> = Vec::new();
-        for s in &self.stretches {
-            let share = ((windows * s.len()) as f64 / total as f64).round().max(1.0) as usize;
+        for s in taken {
+            let share = ((windows * s.len()) as f64 / within as f64).round().max(1.0) as usize;
             let length = length.min(s.len());
             let mut starts: Vec<usize> =
                 if share == 1 { vec![0] } else { (0..share).map(|i| i * (s.len() - length) / (share - 1)).collect() };
-            let power = |start: usize| -> f64 {
-                let y = &s.outputs[0][start..start + length];
-                let v: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
-                let mean = v.iter().sum::<f64>() / v.len().max(1) as f64;
-                v.iter().map(|x| (x - mean).powi(2)).sum()
-            };
+            let power = |start: usize| loudness(s, start, length);
             // One window in the middle moves to the loudest place, unless it would overlap the others.
             if share > 2 {
                 let loudest = (0..=(s.len() - length) / length.max(1))
@@ -116,6 +133,23 @@ mod tests {
         assert!(w.samples() <= 4000 && w.samples() > 2500, "{}", w.samples());
         assert_eq!(w.stretches.first().unwrap().samples.start, 0);
         assert_eq!(w.stretches.last().unwrap().samples.end, n);
+    }
+
+    #[test]
+    fn of_many_stretches_no_more_than_the_limit_is_taken() {
+        let n = 100_000;
+        let mut u = ramp(n);
+        // A gap every thousand samples, and one stretch that is longer.
+        (1..100).filter(|k| *k != 50).for_each(|k| u[1000 * k] = f64::NAN);
+        let y: Vec<f64> = (0..n).map(|i| (i as f64 * 0.1).sin()).collect();
+        let d = DataSet::new(&simulation(), &[recording(u, y)], 1).unwrap();
+        let w = d.within(12_000);
+        assert!(w.samples() <= 12_000 && w.samples() > 6000, "{}", w.samples());
+        assert!(
+            w.stretches.iter().any(|s| (49_000..51_000).contains(&s.samples.start)),
+            "the longest one is among them"
+        );
+        assert!(w.stretches.windows(2).all(|p| p[0].samples.end <= p[1].samples.start));
     }
 
     #[test]

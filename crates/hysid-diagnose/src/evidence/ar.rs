@@ -55,14 +55,6 @@ impl ArModel {
         self.sigma.first().copied().unwrap_or(0.0)
     }
 
-    /// The same model with another innovation scale.
-    pub fn rescaled(&self, factor: f64) -> Self {
-        Self {
-            predictors: self.predictors.clone(),
-            sigma: self.sigma.iter().map(|s| (s * factor).max(f64::MIN_POSITIVE)).collect(),
-        }
-    }
-
     /// Whitens one contiguous stretch into `out` (same length): unit variance where the model holds.
     pub fn whiten(&self, e: &[f64], out: &mut [f64]) {
         let p = self.order();

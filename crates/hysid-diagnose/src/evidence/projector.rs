@@ -1,6 +1,6 @@
 //! The projector onto the complement of what the simulation's own parameters and initial states can do.
 
-/// Inner product, summed in fixed order in four lanes.
+/// Inner product, summed in fixed order in eight lanes.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a, b) = (&a[..n], &b[..n]);

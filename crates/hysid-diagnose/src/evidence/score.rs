@@ -124,7 +124,7 @@ pub fn surprise(gain: f64, unknowns: usize) -> f64 {
     gain - (half - 1.0) * gain.ln() + ln_gamma(half) - ((half - 1.0) / gain).ln_1p()
 }
 
-/// The smallest amplitude that this record would have shown (5 % false alarms over `candidates` effects, 90 % power), in the
+/// The smallest amplitude that this record would have shown (5 % false alarms over `candidates` effects, 80 % power, both sides), in the
 /// amplitude's own unit: `(2.8 + sqrt(2 ln candidates)) / norm`, for a whitened noise of unit variance.
 pub fn detectable_amplitude(group: &FeatureGroup, noise: f64, candidates: usize) -> f64 {
     let threshold = 2.8 + (2.0 * (candidates.max(1) as f64).ln()).sqrt();

@@ -55,7 +55,8 @@ pub struct Contender<'a> {
     pub handicap: f64,
 }
 
-/// Samples until the autocorrelation of the series stays below 0.1, at least 1, over the longest series of the stack.
+/// Samples until the autocorrelation of the series is first below 0.1, at least 1, over the longest series of the stack: a quarter of a period where the
+/// series oscillates.
 pub fn correlation_time(layout: &Layout, r: &[f64]) -> usize {
     let Some(s) = layout.series.iter().max_by_key(|s| s.rows.len()) else { return 1 };
     let x = &r[s.rows.clone()];
@@ -136,8 +137,11 @@ fn drawn(layout: &Layout, levels: &[Vec<f64>], rows: usize, seed: u64, index: u6
     for (s, levels) in layout.series.iter().zip(levels) {
         let lines: Vec<(f64, f64)> = levels
             .iter()
-            .map(|l| {
-                let mut part = || (0.5 * l).sqrt() * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+            .enumerate()
+            .map(|(k, l)| {
+                // The mean and the line at half the sampling rate are real: all of their power is in one part.
+                let share = if k == 0 || 2 * k == s.rows.len() { 1.0 } else { 0.5 };
+                let mut part = || (share * l).sqrt() * Distribution::<f64>::sample(&StandardNormal, &mut rng);
                 (part(), part())
             })
             .collect();

@@ -90,7 +90,7 @@ struct Trial {
 fn library(setting: &Setting<'_>, seed: u64, row: usize) -> Vec<Trial> {
     let Some(stretch) = setting.data.stretches.iter().max_by_key(|s| s.len()) else { return Vec::new() };
     let n = stretch.len().min(LONGEST);
-    let period = setting.data.period_s;
+    let period = stretch.drive.period_s();
     let inputs = stretch.drive.inputs();
     let Some(u) = inputs.first() else { return Vec::new() };
     let mean = u.iter().sum::<f64>() / u.len() as f64;
@@ -232,7 +232,7 @@ fn propose(
     }
     let (trial, expected) = best?;
     let separable = expected >= SAME;
-    let duration_s = trial.drive.len() as f64 * setting.data.period_s;
+    let duration_s = trial.drive.len() as f64 * trial.drive.period_s();
     let sensor = (!separable).then(|| match setting.original.inputs.first() {
         Some(u) => {
             format!("a second sensor: the signal between the input `{}` and the moving part, or a velocity", u.column)

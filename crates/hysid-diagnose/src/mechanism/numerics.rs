@@ -31,8 +31,8 @@ pub static SOLVER_ARTEFACT: Mechanism = Mechanism {
 pub struct Variant {
     /// What was changed, for people.
     pub what: &'static str,
-    /// The changed simulation; `None`: the same simulation at half the step.
-    pub simulation: Option<Simulation>,
+    /// The changed simulation.
+    pub simulation: Simulation,
 }
 
 /// The place of a smoothed friction law taken by one that sticks.
@@ -42,10 +42,9 @@ pub const SHARPER: &str = "smoothed friction three times as sharp";
 
 /// The variants of a simulation whose outputs are to be compared with its own.
 ///
-/// `period_s` is the recording's sampling period. The half-sample shifts are made with `delay`: of the inputs (the recording's
-/// outputs come later than the simulation thinks) and of the outputs' inputs' counterpart, the outputs.
+/// `period_s` is the recording's sampling period. Outputs that come half a sample late are made with `delay`; shorter integration steps are no
+/// variant, since the search asks for them itself where a fit needs them.
 pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
-    let mut found = vec![Variant { what: "half the step", simulation: None }];
     let mut held = simulation.clone();
     held.time.hold = match held.time.hold {
         Hold::Linear => Hold::Zero,
@@ -55,14 +54,14 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
         Hold::Zero => "inputs held between samples",
         Hold::Linear => "inputs interpolated between samples",
     };
-    found.push(Variant { what, simulation: Some(held) });
+    let mut found = vec![Variant { what, simulation: held }];
     let half = Expr::Number(period_s / 2.0);
     let mut late = simulation.clone();
     for output in &mut late.outputs {
         output.expression = output.expression.clone().delay(half.clone());
     }
     if late.validate().is_ok() {
-        found.push(Variant { what: "outputs half a sample late", simulation: Some(late) });
+        found.push(Variant { what: "outputs half a sample late", simulation: late });
     }
     let replaced = |law: &dyn Fn(Vec<Expr>) -> Expr| {
         let mut other = simulation.clone();
@@ -84,7 +83,7 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
         Expr::Call(Function::Tanh, arguments.into_iter().map(|a| Expr::Number(3.0) * a).collect())
     });
     for (what, other) in [(STICKS, sticks), (SHARPER, sharper)] {
-        found.extend(other.map(|s| Variant { what, simulation: Some(s) }));
+        found.extend(other.map(|simulation| Variant { what, simulation }));
     }
     found
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hysid_plant::{Expr, Initial, Parameter, Simulation, State, Unit};
+use hysid_plant::{Expr, Initial, Output, Parameter, Simulation, State, Unit};
 
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
@@ -79,6 +79,17 @@ fn unit_told(slot: &Slot, measure: &str) -> Option<Unit> {
     if measure == "1/t" && unit.to_string() == "1/s" { Unit::parse("Hz").ok() } else { Some(unit) }
 }
 
+/// The outputs that measure the derivative of a state, each with the multiple.
+fn sensors<'s>(
+    simulation: &'s mut Simulation,
+    slot: &'s Slot,
+    state: &'s str,
+) -> impl Iterator<Item = (&'s mut Output, f64)> {
+    let times =
+        move |o: &Output| slot.sensed.iter().find(|s| s.state == state && s.column == o.column).map(|s| s.times);
+    simulation.outputs.iter_mut().filter_map(move |o| times(o).map(|times| (o, times)))
+}
+
 /// The law's text at its target.
 fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Writer<'_>) -> Result<(), String> {
     match (&slot.target, change) {
@@ -116,16 +127,22 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             let resists = if matches!(change, Change::Drive(_)) { -1.0 } else { 1.0 };
             for (name, sign) in states {
                 let derivative = simulation.state(name).ok_or("the state is gone")?.derivative.clone();
-                let joined = |sum: Expr| if sign * resists > 0.0 { sum - force.clone() } else { sum + force.clone() };
-                let written = match force_path(simulation, &derivative) {
-                    ForcePath::Quotient(above, below) => joined(above.clone()) / below.clone(),
+                let joined = |sum: Expr, part: &Expr| {
+                    if sign * resists > 0.0 { sum - part.clone() } else { sum + part.clone() }
+                };
+                let (written, rate) = match force_path(simulation, &derivative) {
+                    ForcePath::Quotient(above, below) => {
+                        (joined(above.clone(), &force) / below.clone(), force.clone() / below.clone())
+                    }
                     ForcePath::Divided(mass) => {
                         let rate = force.clone() / mass.clone();
-                        let sum = derivative.clone();
-                        if sign * resists > 0.0 { sum - rate } else { sum + rate }
+                        (joined(derivative.clone(), &rate), rate)
                     }
-                    ForcePath::Bare => joined(derivative.clone()),
+                    ForcePath::Bare => (joined(derivative.clone(), &force), force.clone()),
                 };
+                for (output, times) in sensors(simulation, slot, name) {
+                    output.expression = joined(output.expression.clone(), &(Expr::Number(times) * rate.clone()));
+                }
                 if let Some(state) = simulation.state_mut(name) {
                     state.derivative = written;
                 }
@@ -147,6 +164,10 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
                     }
                     ForcePath::Bare => (derivative.clone() - force.clone()) / (Expr::Number(1.0) + more.clone()),
                 };
+                for (output, times) in sensors(simulation, slot, name) {
+                    let change = Expr::Number(times) * (written.clone() - derivative.clone());
+                    output.expression = output.expression.clone() + change;
+                }
                 if let Some(state) = simulation.state_mut(name) {
                     state.derivative = written;
                 }

@@ -66,8 +66,30 @@ pub struct Base<'d> {
     pub whitener: Whitener,
     /// Ways of an unknown force to each output; none where no noise is coloured.
     pub paths: Vec<Vec<ForcePath>>,
+    /// How many independent rows each row stands for.
+    pub share: f64,
     /// Log likelihood of the residual under that noise, less half of `ln n` for each coefficient of the noise model.
     pub log_likelihood: f64,
+}
+
+/// A fitted parameter and how well it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interval {
+    /// Its name.
+    pub name: String,
+    /// The estimate.
+    pub value: f64,
+    /// The ends of its 95 % interval; `None` where nothing tells: it stands at a bound, or the recording does not see it.
+    pub ends: Option<[f64; 2]>,
+    /// Whether it stands at a bound.
+    pub at_bound: bool,
+}
+
+impl Interval {
+    /// The lower and the upper end, each where there is one.
+    pub fn low_and_high(&self) -> (Option<f64>, Option<f64>) {
+        self.ends.map_or((None, None), |[low, high]| (Some(low), Some(high)))
+    }
 }
 
 /// Where a fit begins.
@@ -96,7 +118,7 @@ pub fn fit_simulation<'d>(
     let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
     let mut noise = match whitener {
         Some(w) if kind == NoiseKind::Coloured || w.order() == 0 => w.clone(),
-        _ => data.layout.fit_noise(&data.y, 0, &[]),
+        _ => data.layout.fit_noise(&data.about_means(), 0, &[]),
     };
     let mut fit: Option<Fit> = None;
     let mut paths = Vec::new();
@@ -117,7 +139,7 @@ pub fn fit_simulation<'d>(
     }
     let fit = fit?;
     let log_likelihood = kind.share() * log_likelihood(data, &noise, &fit.residual);
-    Some(Base { model, fit, whitener: noise, paths, log_likelihood })
+    Some(Base { model, fit, whitener: noise, paths, share: kind.share(), log_likelihood })
 }
 
 /// Log likelihood of a residual under a noise model, up to a constant of the data set.
@@ -165,9 +187,7 @@ impl Base<'_> {
     /// Whether the simulation is so far from the recording that its parameters say little.
     pub fn far(&self) -> bool {
         let data = self.model.data();
-        let mean = data.y.iter().sum::<f64>() / data.rows().max(1) as f64;
-        let power: f64 = data.y.iter().map(|y| (y - mean).powi(2)).sum();
-        norm2(&self.fit.residual) > FAR * FAR * power
+        data.relative_squares(&self.fit.residual) > FAR * FAR * data.rows() as f64
     }
 
     /// The document with the fitted values.
@@ -180,26 +200,44 @@ impl Base<'_> {
         self.model.values(&self.fit.theta)
     }
 
+    /// What the fitted simulation leaves of data with the same stretches, whose rows may be others; `None` where it diverges.
+    pub fn residual_on(&self, data: &DataSet) -> Option<Vec<f64>> {
+        if data.step == self.model.data().step {
+            return Some(self.fit.residual.clone());
+        }
+        let model = Model::new(self.model.simulation(), data, self.model.substeps()).ok()?;
+        let predicted = model.predict(&model.theta(&self.values()))?;
+        Some(data.y.iter().zip(&predicted).map(|(y, p)| y - p).collect())
+    }
+
     /// The projector off the whitened tangent space of all unknowns, and the whitened residual projected off it.
     pub fn evidence(&self) -> (Projector, Vec<f64>) {
+        self.evidence_under(&self.whitener)
+    }
+
+    /// The same under another noise.
+    pub fn evidence_under(&self, noise: &Whitener) -> (Projector, Vec<f64>) {
         let layout = &self.model.data().layout;
-        let own = Projector::new(self.fit.jacobian.iter().map(|c| self.whitener.apply(layout, c)));
-        let mut r = self.whitener.apply(layout, &self.fit.residual);
+        let own = Projector::new(self.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
+        let mut r = noise.apply(layout, &self.fit.residual);
         own.remove(&mut r);
         (own, r)
     }
 
-    /// 95 % intervals of the parameters (not of initial values): name, value, low, high, whether at a bound.
-    pub fn intervals(&self) -> Vec<(String, f64, f64, f64, bool)> {
+    /// The parameters (not initial values) with their 95 % intervals.
+    pub fn intervals(&self) -> Vec<Interval> {
         let k = self.fit.theta.len();
         let covariance = self.covariance();
         let bounds = self.model.bounds();
         (0..k)
             .filter_map(|i| {
                 let name = self.model.name_of(i)?.to_owned();
-                let x = self.fit.theta[i];
-                let half = 1.96 * covariance[i + k * i].max(0.0).sqrt();
-                Some((name, x, (x - half).max(bounds[i].0), (x + half).min(bounds[i].1), self.fit.at_bound[i]))
+                let value = self.fit.theta[i];
+                let variance = covariance[i + k * i];
+                let half = 1.96 * variance.sqrt();
+                let within = || [(value - half).max(bounds[i].0), (value + half).min(bounds[i].1)];
+                let ends = (variance > 0.0).then(within);
+                Some(Interval { name, value, ends, at_bound: self.fit.at_bound[i] })
             })
             .collect()
     }
@@ -208,7 +246,8 @@ impl Base<'_> {
     pub fn covariance(&self) -> Vec<f64> {
         let data = self.model.data();
         let white = self.whitener.apply(&data.layout, &self.fit.residual);
-        let variance = norm2(&white) / (data.rows().saturating_sub(self.fit.theta.len())).max(1) as f64;
+        let witnesses = self.share * data.rows().saturating_sub(self.fit.theta.len()).max(1) as f64;
+        let variance = norm2(&white) / witnesses;
         self.fit.covariance(&data.layout, &self.whitener, None, variance)
     }
 }

@@ -28,10 +28,9 @@ pub fn free_run(document: &Simulation, data: &DataSet, substeps: usize) -> Optio
     let free = !model.unknowns().is_empty();
     let mut values = Values::default();
     if free && !head.y.is_empty() {
-        let noise: Whitener = head.layout.fit_noise(&head.y, 0, &[]);
+        let noise: Whitener = head.layout.fit_noise(&head.about_means(), 0, &[]);
         let start = model.theta(&values);
         let options = LmOptions { iterations: 25, ..LmOptions::default() };
-        // A few starts: a free initial state of a hysteretic element can lie on another branch.
         if let Some(fit) = levenberg_marquardt(&model, &start, &head.layout, &noise, None, options) {
             values = model.values(&fit.theta);
         }

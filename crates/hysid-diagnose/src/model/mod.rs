@@ -141,7 +141,9 @@ impl<'d> Model<'d> {
             return y.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
         }
         let integral = simulation.states.iter().find(|s| matches!(&s.derivative, Expr::Symbol(v) if v == state));
-        integral.and_then(|x| measured(&x.name)).map_or(0.0, |y| slope(y) / self.data.period_s)
+        integral
+            .and_then(|x| measured(&x.name))
+            .map_or(0.0, |y| slope(y) / self.data.stretches[stretch].drive.period_s())
     }
 
     /// The values by name of a `theta`, fixed parameters included.

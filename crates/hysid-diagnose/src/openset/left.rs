@@ -35,6 +35,8 @@ pub struct Left<'d> {
     instead: Option<OpenSet>,
     /// Generic terms in its place, refitted, where those explain far more, with what the tangent said of them.
     swapped: Option<(Refitted<'d>, OpenSet)>,
+    /// The generic terms of the simulation without effects, refitted, where that was tried and did not explain far more.
+    tried: Option<Refitted<'d>>,
     /// What is written into the simulation, as it was refitted.
     written: Option<CorrectionRecord>,
     /// Whether generic terms explain so much that the set is an imitation.
@@ -60,7 +62,8 @@ impl<'d> Left<'d> {
         let generic = if winner > 0 { search.open(none) } else { None };
         let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
         let outdone = generic.as_ref().is_some_and(outdone);
-        let swapped = if winner > 0 && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { None };
+        let (swapped, tried) =
+            if winner > 0 && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { (None, None) };
         let outdone = outdone || swapped.is_some();
         let foreign = winner > 0 && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
         // What was not looked at is not known to be nothing.
@@ -69,7 +72,7 @@ impl<'d> Left<'d> {
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
         let instead = generic.filter(|g| spectrum || (outdone && swapped.is_none() && g.gain > both));
-        Self { test, open, instead, swapped, written: None, foreign, spectrum, imperfect, alpha }
+        Self { test, open, instead, swapped, tried, written: None, foreign, spectrum, imperfect, alpha }
     }
 
     /// As it is reported; `None` where it was not looked at.
@@ -107,25 +110,29 @@ impl<'d> Left<'d> {
         let setting = &search.setting;
         let swapped = self.swapped.take();
         let replaced = swapped.is_some();
-        let refitted = |(i, open): (usize, Option<&OpenSet>)| {
-            let (parent, open) = (&pool[i], open?);
-            Some((fitted(setting, parent, open.writable.as_ref()?)?, open.clone(), self.stands_by_evidence(open)))
-        };
-        let (Refitted { hypothesis: best, terms }, of, sure) = match swapped {
+        let (Refitted { hypothesis: best, terms, slot }, of, sure) = match swapped {
             Some((refitted, of)) => (refitted, of, true),
             None => {
-                let instead = if winner > 0 { search.open(&pool[0]) } else { None };
-                [(winner, self.open.as_ref()), (0, instead.as_ref())]
-                    .into_iter()
-                    .filter_map(refitted)
-                    .max_by(|a, b| a.0.hypothesis.log_evidence.total_cmp(&b.0.hypothesis.log_evidence))?
+                let tried = self.tried.take();
+                let on_top =
+                    self.open.as_ref().and_then(|o| Some((o, fitted(setting, &pool[winner], o.writable.as_ref()?)?)));
+                let generic = if winner > 0 { search.open(&pool[0]) } else { None };
+                let instead = generic.as_ref().and_then(|o| {
+                    let refitted = tried.or_else(|| fitted(setting, &pool[0], o.writable.as_ref()?))?;
+                    Some((o, refitted))
+                });
+                let both = on_top.into_iter().chain(instead);
+                let (of, refitted) =
+                    both.max_by(|(_, a), (_, b)| a.hypothesis.log_evidence.total_cmp(&b.hypothesis.log_evidence))?;
+                (refitted, of.clone(), self.stands_by_evidence(of))
             }
         };
         let (_, before) = block_score(setting, &pool[otherwise])?;
         let (_, after) = block_score(setting, &best)?;
         let ratio = (after.iter().sum::<f64>() / before.iter().sum::<f64>()).sqrt();
         let better = ratio < 1.0;
-        let record = CorrectionRecord { terms, ratio: finite(ratio), ..of.record.clone() };
+        let slot = slot.unwrap_or_else(|| of.record.slot.clone());
+        let record = CorrectionRecord { slot, terms, ratio: finite(ratio), ..of.record.clone() };
         if replaced {
             // What stands in the set's place is told.
             let gain = best.log_evidence - pool[0].log_evidence - of.choice;
@@ -165,7 +172,7 @@ impl<'d> Left<'d> {
 }
 
 /// Generic terms, refitted in the place of a set, that explain far more, with what the tangent said of them: those that the set leaves (`seen`) and
-/// those of the simulation without effects.
+/// those of the simulation without effects. Where none does, those of the simulation without effects as they were refitted, where that was tried.
 ///
 /// Where the set is an imitation, what it leaves is a small part of what is really missing: the right term shows beside the wrong effects. The regression,
 /// which knows the simulation without effects only by its tangent, may choose another one there.
@@ -175,22 +182,25 @@ fn in_place<'d>(
     best: &Hypothesis<'d>,
     seen: Option<&OpenSet>,
     generic: Option<&OpenSet>,
-) -> Option<(Refitted<'d>, OpenSet)> {
+) -> (Option<(Refitted<'d>, OpenSet)>, Option<Refitted<'d>>) {
     let explained = best.log_evidence - none.log_evidence;
     let likely =
         |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
+    let refitted = |o: &OpenSet| {
+        let terms = Writable::Sparse(o.sparse()?.within(none.base.document()));
+        if search.setting.budget.omits(Step::Imitation) {
+            return None;
+        }
+        Some((fitted(&search.setting, none, &terms)?, o.clone()))
+    };
     let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - best.log_evidence - o.choice;
-    seen.into_iter()
-        .chain(generic.filter(likely))
-        .filter_map(|o| {
-            let terms = Writable::Sparse(o.sparse()?.within(none.base.document()));
-            if search.setting.budget.omits(Step::Imitation) {
-                return None;
-            }
-            Some((fitted(&search.setting, none, &terms)?, o.clone()))
-        })
-        .filter(|swapped| lead(swapped) > FAR_MORE)
-        .max_by(|a, b| lead(a).total_cmp(&lead(b)))
+    let (beside, alone) = (seen.and_then(refitted), generic.filter(likely).and_then(refitted));
+    let leads = |swapped: &Option<(Refitted<'d>, OpenSet)>| swapped.as_ref().map(lead).filter(|l| *l > FAR_MORE);
+    match (leads(&beside), leads(&alone)) {
+        (None, None) => (None, alone.map(|(refitted, _)| refitted)),
+        (Some(a), b) if b.is_none_or(|b| b < a) => (beside, None),
+        _ => (alone, None),
+    }
 }
 
 /// The noise that the best model leaves, by output.

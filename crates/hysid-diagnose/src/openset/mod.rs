@@ -17,10 +17,10 @@ mod regress;
 mod shapes;
 mod signature;
 mod terms;
-mod uneven;
+pub mod uneven;
 mod varying;
 mod view;
-mod wanders;
+pub mod wanders;
 mod written;
 
 use hysid_linalg::Matrix;
@@ -29,16 +29,15 @@ use hysid_select::{Criterion, Options as Selecting, select};
 
 use crate::answer::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::data::held_out_blocks;
-use crate::evidence::{Projector, Whitener, norm2};
+use crate::evidence::{Whitener, norm2};
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use regress::regress;
 use shapes::Kind;
 use signature::signature;
 use terms::{Term, terms};
-pub use uneven::uneven;
 use varying::{Varying, varying};
-pub use wanders::wanders;
+use view::View;
 use written::{Sparse, with_oscillation};
 
 /// A correction with what decides whether it is believed.
@@ -111,8 +110,10 @@ struct Chosen {
 pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let noises = noises(base, kind);
     let terms = terms(base);
-    let sparse =
-        noises.iter().filter_map(|noise| choose(base, kind, &terms, noise)).max_by(|a, b| a.gain.total_cmp(&b.gain));
+    // Where a parameter stands at a bound the tangent goes on, and what it gains there is no correction's.
+    let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
+    let chosen = noises.iter().filter_map(|noise| choose(base, kind, &terms, noise, none));
+    let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
     match (sparse, varying(base, kind, &noises)) {
         (Some(sparse), Some(varying)) if varying.gain > sparse.gain => Some(of_varying(base, varying)),
         (None, Some(varying)) => Some(of_varying(base, varying)),
@@ -154,7 +155,6 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
         .zip(&best.err)
         .map(|((&i, c), err)| TermRecord { term: terms[i].text.clone(), coefficient: *c, err: *err })
         .collect();
-    let slot = terms[best.terms[0]].slot.clone();
     let signature = signature(base, terms, &best.left, &best.terms, &best.coefficients);
     // A term that is a function of the time in this recording, beside others that are not, mends what those leave of the mismatch on the tangent, and
     // says nothing of another recording.
@@ -166,6 +166,7 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
         let (coefficients, _) = regress(base, &picked, &best.left, None, 0.0);
         (lasting, coefficients)
     };
+    let slot = terms[kept[0]].slot.clone();
     let bare = |i: usize| Term { column: Vec::new(), ..terms[i].clone() };
     let sparse = Sparse::new(base.document(), kept.iter().map(|&i| bare(i)).zip(coefficients));
     OpenSet {
@@ -205,19 +206,15 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
     }
 }
 
-/// The terms that explain the residual under a noise model; `None` where there are none.
-fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) -> Option<Chosen> {
+/// The terms that explain the residual under a noise model, beside the log likelihood of `none`; `None` where there are none.
+fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener, none: f64) -> Option<Chosen> {
     let layout = &base.model.data().layout;
-    let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
-    let mut r = noise.apply(layout, &base.fit.residual);
-    own.remove(&mut r);
+    let view = View::new(base, noise);
     let (usable, columns): (Vec<usize>, Vec<Vec<f64>>) = terms
         .iter()
         .enumerate()
         .filter_map(|(i, t)| {
-            let mut w = noise.apply(layout, &t.column);
-            let whole = norm2(&w);
-            own.remove(&mut w);
+            let (whole, w) = view.column(&t.column);
             (whole.is_finite() && norm2(&w) > RANK_TOLERANCE * whole).then_some((i, w))
         })
         .unzip();
@@ -225,7 +222,7 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
     // Hundreds of columns of a long recording, twice, are most of the memory of a diagnosis.
     drop(columns);
     let options = Selecting { criterion: Criterion::SearchedPress, max_terms: MOST_TERMS, ..Selecting::default() };
-    let selection = select(&phi, &r, &options).ok()?;
+    let selection = select(&phi, &view.r, &options).ok()?;
     if selection.terms.is_empty() {
         return None;
     }
@@ -239,20 +236,11 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener) ->
         (coefficients, after) = regress(base, &picked, &left, None, 0.0);
     }
     let data = base.model.data();
-    let likelihood = kind.share()
-        * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)
-            - spared(data, &base.whitener, &base.whitener));
+    let likelihood = kind.share() * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener));
     // Generic terms pay for their coefficients what an effect pays for its parameters, and for having been chosen out of many.
     let among: f64 = (0..chosen.len()).map(|k| ((usable.len() - k) as f64 / (k + 1) as f64).ln()).sum();
     let further = Count { lasting: chosen.len(), passing: 0 };
     let price = kind.price(base.model.count().lasting, further, after.len()) + among;
     let err = selection.steps.iter().map(|s| s.err).collect();
-    Some(Chosen {
-        terms: chosen,
-        err,
-        coefficients,
-        left,
-        gain: likelihood - base.log_likelihood - price,
-        choice: among,
-    })
+    Some(Chosen { terms: chosen, err, coefficients, left, gain: likelihood - none - price, choice: among })
 }

@@ -21,6 +21,8 @@ pub struct Refitted<'d> {
     pub hypothesis: Hypothesis<'d>,
     /// The terms that it needs there, as they were fitted; none for a parameter that oscillates.
     pub terms: Vec<TermRecord>,
+    /// The slot of the loudest of them.
+    pub slot: Option<String>,
 }
 
 /// Times that terms are looked for around a correction that was refitted.
@@ -38,7 +40,7 @@ pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Wri
     let sparse = match writable {
         Writable::Oscillation(simulation) => {
             let hypothesis = fit(setting, parent, &parent.base.values(), simulation)?;
-            return Some(Refitted { hypothesis, terms: Vec::new() });
+            return Some(Refitted { hypothesis, terms: Vec::new(), slot: None });
         }
         Writable::Sparse(sparse) => sparse.clone(),
     };
@@ -48,7 +50,9 @@ pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Wri
         best = longer;
     }
     let terms = told(parent, &best)?;
-    Some(Refitted { hypothesis: best.hypothesis, terms })
+    let loudest = terms.iter().zip(best.sparse.slots()).max_by(|(a, _), (b, _)| a.err.total_cmp(&b.err));
+    let slot = loudest.map(|(_, slot)| slot.to_owned());
+    Some(Refitted { hypothesis: best.hypothesis, terms, slot })
 }
 
 /// The terms of a correction as they were fitted, each with the share of the residual's power, before any of them, that it explains.
@@ -131,8 +135,9 @@ fn without_the_weakest<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, best:
 fn certainty(base: &Base<'_>, names: &[Vec<String>]) -> Option<Vec<f64>> {
     let intervals = base.intervals();
     let of = |names: &Vec<String>| {
-        let (_, value, low, high, _) = intervals.iter().find(|i| Some(&i.0) == names.first())?;
-        Some(value.abs() / (high - low).max(f64::MIN_POSITIVE))
+        let of = intervals.iter().find(|i| Some(&i.name) == names.first())?;
+        // Nothing is known of one that stands at a bound, or that nothing moves.
+        Some(of.ends.map_or(0.0, |[low, high]| of.value.abs() / (high - low).max(f64::MIN_POSITIVE)))
     };
     names.iter().map(of).collect()
 }

@@ -5,11 +5,10 @@ use std::f64::consts::TAU;
 
 use hysid_plant::{Expr, Function};
 
+use super::course::Series;
+use super::written::FORM;
 use crate::answer::text::number;
-use crate::data::DataSet;
-
-/// Samples of a signal by stretch.
-pub type Series = Vec<Vec<f64>>;
+use crate::data::{DataSet, Stretch};
 
 /// What a generic term is a function of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -60,6 +59,23 @@ const CYCLES: [f64; 5] = [1.0, 1.41, 2.0, 2.83, 4.0];
 /// Width of a gate over the distance of its knee.
 const GATE: f64 = 0.1;
 
+/// A knee, a width or a wave number as it is written: three digits, and more where they would make it one of the numbers that are part of a term's form
+/// ([`FORM`]), which no fit moves.
+fn free(x: f64) -> String {
+    let rounded = number(x);
+    if !FORM.iter().any(|n| rounded.parse() == Ok(*n)) {
+        return rounded;
+    }
+    let near = if x == x.round() { x * (1.0 + 1e-4) } else { x };
+    format!("{near:.6}")
+}
+
+/// A moment as it is written, to a thousandth of a width.
+fn moment(t: f64, width: f64) -> String {
+    let digits = (3.0 - width.log10().floor()).clamp(0.0, 15.0) as usize;
+    format!("{t:.digits$}")
+}
+
 /// A function of each sample.
 fn each(x: &[Vec<f64>], f: impl Fn(f64) -> f64) -> Series {
     x.iter().map(|s| s.iter().map(|v| f(*v)).collect()).collect()
@@ -98,11 +114,11 @@ pub fn curves(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<Shape> {
     if velocity {
         let [small] = quantiles(x, [0.8]).map(|q| 0.05 * q);
         if small > 0.0 {
-            out.push(Shape::new(format!("tanh({name}/{})", number(small)), Kind::Odd, each(x, |v| (v / small).tanh())));
+            out.push(Shape::new(format!("tanh({name}/{})", free(small)), Kind::Odd, each(x, |v| (v / small).tanh())));
         }
     }
     for g in quantiles(x, KNEES) {
-        let n = number(g);
+        let n = free(g);
         out.push(Shape::new(format!("max({name} - {n}, 0)"), Kind::Even, each(x, |v| (v - g).max(0.0))));
         out.push(Shape::new(format!("max(-{n} - {name}, 0)"), Kind::Even, each(x, |v| (-g - v).max(0.0))));
     }
@@ -112,7 +128,7 @@ pub fn curves(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<Shape> {
                 *w = w.max(v - r).min(v + r);
                 *w
             };
-            Shape::new(format!("play({name}, {})", number(r)), Kind::Play, in_turn(x, |first| first, play))
+            Shape::new(format!("play({name}, {})", free(r)), Kind::Play, in_turn(x, |first| first, play))
         }));
     }
     out
@@ -132,7 +148,7 @@ pub fn relays(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
             }
             *up
         };
-        let n = number(r);
+        let n = free(r);
         // As the operator has it: at rest it is down.
         Shape::new(format!("relay({name}, -{n}, {n})"), Kind::Play, in_turn(x, |_| -1.0, switch))
     };
@@ -141,22 +157,23 @@ pub fn relays(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
 
 /// What first-order lags of a coordinate leave of it: time constants of the length of the recording.
 pub fn lags(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
-    let longest = data.stretches.iter().map(|s| s.len() as f64 * data.period_s).fold(0.0, f64::max);
+    let longest = data.stretches.iter().map(|s| s.len() as f64 * s.drive.period_s()).fold(0.0, f64::max);
     LAGS.map(|part| {
         let tau = longest / part;
-        let (a, ratio) = ((-data.period_s / tau).exp(), tau / data.period_s);
         // Exact where the coordinate is linear between samples.
-        let left = in_turn(
-            x,
-            |first| (first, 0.0),
-            |(before, behind), v| {
+        let behind = |(samples, stretch): (&Vec<f64>, &Stretch)| {
+            let period_s = stretch.drive.period_s();
+            let (a, ratio) = ((-period_s / tau).exp(), tau / period_s);
+            let next = |(before, behind): &mut (f64, f64), v: f64| {
                 let settled = (v - *before) * ratio;
                 *behind = settled + a * (*behind - settled);
                 *before = v;
                 *behind
-            },
-        );
-        Shape::new(format!("{name} - lag({name}, {})", number(tau)), Kind::Lag, left)
+            };
+            in_turn(std::slice::from_ref(samples), |first| (first, 0.0), next).concat()
+        };
+        let left = x.iter().zip(&data.stretches).map(behind).collect();
+        Shape::new(format!("{name} - lag({name}, {})", free(tau)), Kind::Lag, left)
     })
     .into()
 }
@@ -166,17 +183,19 @@ pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
     let over = |f: &dyn Fn(f64) -> f64| -> Series {
         x.iter()
             .zip(&data.stretches)
-            .map(|(s, st)| s.iter().enumerate().map(|(n, v)| v * f(st.start_s + n as f64 * data.period_s)).collect())
+            .map(|(s, st)| {
+                s.iter().enumerate().map(|(n, v)| v * f(st.start_s + n as f64 * st.drive.period_s())).collect()
+            })
             .collect()
     };
     let mut out = vec![Shape::new(format!("t*{name}"), Kind::Time, over(&|t| t))];
-    let ends = data.stretches.iter().map(|s| (s.start_s, s.start_s + s.len() as f64 * data.period_s));
+    let ends = data.stretches.iter().map(|s| (s.start_s, s.start_s + s.len() as f64 * s.drive.period_s()));
     let (first, last) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (c, d)| (a.min(c), b.max(d)));
     let width = (last - first) / (TENTS - 1) as f64;
     if width > 0.0 {
         out.extend((0..TENTS).map(|i| {
             let at = first + i as f64 * width;
-            let text = format!("max(1 - abs(t - {})/{}, 0)*{name}", number(at), number(width));
+            let text = format!("max(1 - abs(t - {})/{}, 0)*{name}", moment(at, width), moment(width, width));
             Shape::new(text, Kind::Time, over(&|t| (1.0 - (t - at).abs() / width).max(0.0)))
         }));
     }
@@ -209,7 +228,7 @@ pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>])) -> Vec<
         (format!("{a}^2"), false, Box::new(|x| x * x)),
     ];
     for g in quantiles(x, KNEES).into_iter().filter(|g| *g > 0.0) {
-        let (n, s, width) = (number(g), GATE * g, number(GATE * g));
+        let (n, s, width) = (free(g), GATE * g, free(GATE * g));
         places.push((format!("(1 + tanh(({a} - {n})/{width}))"), false, Box::new(move |x| 1.0 + ((x - g) / s).tanh())));
         places.push((format!("(1 - tanh(({a} + {n})/{width}))"), false, Box::new(move |x| 1.0 - ((x + g) / s).tanh())));
     }
@@ -218,7 +237,7 @@ pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>])) -> Vec<
     let span = spread(x);
     for cycles in CYCLES.into_iter().filter(|_| span > 0.0) {
         let k = TAU * cycles / span;
-        let n = number(k);
+        let n = free(k);
         for (text, odd, f) in
             [(format!("sin({n}*{a})"), true, f64::sin as fn(f64) -> f64), (format!("cos({n}*{a})"), false, f64::cos)]
         {

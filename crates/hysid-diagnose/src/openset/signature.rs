@@ -2,8 +2,9 @@
 
 use super::shapes::Kind;
 use super::terms::Term;
+use super::view::View;
 use crate::answer::file::SignatureRecord;
-use crate::evidence::{FeatureGroup, Projector, Whitener, norm2, score};
+use crate::evidence::{Whitener, norm2};
 use crate::model::base::Base;
 
 /// The signature: which families of terms see the residual.
@@ -14,18 +15,10 @@ pub fn signature(
     chosen: &[usize],
     coefficients: &[f64],
 ) -> SignatureRecord {
-    let data = base.model.data();
-    let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(&data.layout, c)));
-    let mut r = noise.apply(&data.layout, &base.fit.residual);
-    own.remove(&mut r);
-    let total = norm2(&r);
+    let view = View::new(base, noise);
     let family = |wanted: &dyn Fn(&Term) -> bool| -> f64 {
         let columns: Vec<Vec<f64>> = terms.iter().filter(|t| wanted(t)).map(|t| t.column.clone()).collect();
-        if columns.is_empty() {
-            return f64::NEG_INFINITY;
-        }
-        FeatureGroup::new(&columns, &data.layout, noise, &own)
-            .map_or(f64::NEG_INFINITY, |g| score(total, g.explained(&r), r.len(), g.columns.len()))
+        if columns.is_empty() { f64::NEG_INFINITY } else { view.score(&columns) }
     };
     let plant = |t: &Term| t.side == "plant";
     let fixed = family(&|t| plant(t) && matches!(t.kind, Kind::Odd | Kind::Even));

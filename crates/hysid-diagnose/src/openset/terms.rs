@@ -3,13 +3,14 @@
 
 use std::sync::Arc;
 
-use hysid_plant::{Expr, Slot as Place};
+use hysid_plant::{Expr, Simulation, Slot as Place};
 use rayon::prelude::*;
 
-use super::shapes::{self, Kind, Series, Shape, held_beyond};
+use super::course::Series;
+use super::shapes::{self, Kind, Shape, held_beyond};
 use crate::model::base::Base;
 use crate::search::screen::along;
-use crate::slot::Structure;
+use crate::slot::{Sensed, Structure, sensed};
 
 /// A generic signal before it is pushed through the simulation.
 struct Signal {
@@ -155,11 +156,29 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             model.responses_to(&base.fit.theta, &signals)
         })
         .collect();
+    let measured = measured(simulation);
     work.into_iter()
         .zip(columns)
         .filter_map(|(s, column)| {
+            let mut column = column?;
+            for (_, output, times) in measured.iter().filter(|(state, ..)| s.place == Place::State(*state)) {
+                for part in data.layout.series.iter().filter(|part| part.output == *output) {
+                    let direct = data.rows_of(part, &s.series[part.stretch]);
+                    column[part.rows.clone()].iter_mut().zip(direct.iter()).for_each(|(c, d)| *c += times * d);
+                }
+            }
             let Signal { text, coordinates, place, kind, side, slot, .. } = s;
-            Some(Term { text, coordinates, place, kind, side, slot, column: column? })
+            Some(Term { text, coordinates, place, kind, side, slot, column })
         })
         .collect()
+}
+
+/// Places of states and of the outputs that measure their derivatives, with the multiples.
+pub fn measured(simulation: &Simulation) -> Vec<(usize, usize, f64)> {
+    let place = |s: Sensed| {
+        let state = simulation.states.iter().position(|x| x.name == s.state)?;
+        let output = simulation.outputs.iter().position(|o| o.column == s.column)?;
+        Some((state, output, s.times))
+    };
+    sensed(simulation).into_iter().filter_map(place).collect()
 }

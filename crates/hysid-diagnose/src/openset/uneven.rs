@@ -92,7 +92,7 @@ fn of_strengths(base: &Base<'_>, kind: NoiseKind, names: &[String], motion: &[Ex
             sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
             sum
         })?;
-        let (plain, column) = (view.noise_of(&whole), view.of(&[whole]).pop()?);
+        let (plain, column) = view.column(&whole);
         let information = norm2(&column);
         (information > VISIBLE * plain)
             .then(|| bayes_factor(weight * dot(&column, &view.r), weight * information))

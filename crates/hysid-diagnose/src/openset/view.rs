@@ -1,6 +1,6 @@
 //! The residual of a fitted simulation as a noise model sees it.
 
-use crate::evidence::{Layout, Projector, Whitener, norm2, score};
+use crate::evidence::{FeatureGroup, Layout, Projector, Whitener, norm2, score};
 use crate::model::base::{Base, log_likelihood, spared};
 
 /// The residual under a noise, off what is estimated besides.
@@ -16,26 +16,27 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     /// Of a fitted simulation.
     pub fn new(base: &'a Base<'_>, noise: &'a Whitener) -> Self {
-        let layout = &base.model.data().layout;
-        let own = Projector::new(base.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
-        let mut r = noise.apply(layout, &base.fit.residual);
-        own.remove(&mut r);
-        Self { noise, layout, own, r }
+        let (own, r) = base.evidence_under(noise);
+        Self { noise, layout: &base.model.data().layout, own, r }
     }
 
     /// Columns likewise.
     pub fn of(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let white = |x: &Vec<f64>| {
-            let mut w = self.noise.apply(self.layout, x);
-            self.own.remove(&mut w);
-            w
-        };
-        columns.iter().map(white).collect()
+        columns.iter().map(|x| self.column(x).1).collect()
     }
 
-    /// Squared norm of a column under the noise, with what is estimated besides in it.
-    pub(super) fn noise_of(&self, column: &[f64]) -> f64 {
-        norm2(&self.noise.apply(self.layout, column))
+    /// A column likewise, after its squared norm with what is estimated besides in it.
+    pub fn column(&self, x: &[f64]) -> (f64, Vec<f64>) {
+        let mut w = self.noise.apply(self.layout, x);
+        let whole = norm2(&w);
+        self.own.remove(&mut w);
+        (whole, w)
+    }
+
+    /// Score of columns together.
+    pub fn score(&self, columns: &[Vec<f64>]) -> f64 {
+        FeatureGroup::new(columns, self.layout, self.noise, &self.own)
+            .map_or(f64::NEG_INFINITY, |g| score(norm2(&self.r), g.explained(&self.r), self.r.len(), g.columns.len()))
     }
 
     /// Log likelihood that free amplitudes of a few columns gain.

@@ -76,7 +76,7 @@ mod tests {
         let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
         let search = Search::new(setting, Options::default(), &hooks);
         let question = vec![("abrupt_change".to_owned(), "parameter:k".to_owned())];
-        let changed = search.answer(&none, &question).unwrap().unwrap();
+        let changed = search.answer(&none, &question).unwrap();
         assert!(changed.log_evidence > none.log_evidence + SLOW, "{} {}", changed.log_evidence, none.log_evidence);
         let found = wanders(&search, &[none, changed], 1);
         found[0].as_ref().map_or(0.0, |w| w.probability)

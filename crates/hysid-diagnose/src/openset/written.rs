@@ -9,7 +9,7 @@ use hysid_plant::{BinaryOp, Expr, Function, Parameter, Simulation, Slot as Place
 
 use super::course::{Course, phases};
 use super::modulation::multiply;
-use super::terms::{Coordinate, Term};
+use super::terms::{Coordinate, Term, measured};
 use super::varying::Varying;
 use crate::answer::text::number;
 
@@ -18,7 +18,7 @@ const REACH: f64 = 10.0;
 /// How far a shape may move, as multiples of where it began.
 const SHAPES: (f64, f64) = (0.5, 2.0);
 /// Numbers that are part of a term's form.
-const FORM: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
+pub const FORM: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 
 /// Terms with their coefficients, each of which a simulation can go without.
 #[derive(Debug, Clone)]
@@ -59,6 +59,11 @@ impl Sparse {
     /// Its terms as they were fitted.
     fn at(&self, fitted: &[Vec<f64>]) -> Vec<Member> {
         self.members.iter().zip(fitted).map(|(m, f)| Member { fitted: f.clone(), ..m.clone() }).collect()
+    }
+
+    /// The slot of each term.
+    pub fn slots(&self) -> impl Iterator<Item = &str> {
+        self.members.iter().map(|m| m.term.slot.as_str())
     }
 
     /// The terms as they are written, with shapes that were fitted.
@@ -107,6 +112,7 @@ pub fn with_terms<'t>(
     }
     let mut names = Vec::new();
     let mut written = simulation.clone();
+    let measured = measured(simulation);
     // What is added to an input stands for the input as it was: all of its terms enter at once.
     let mut inputs: Vec<Option<Expr>> = vec![None; simulation.inputs.len()];
     for (term, coefficient) in &terms {
@@ -119,6 +125,10 @@ pub fn with_terms<'t>(
         names.push(std::iter::once(name).chain(shapes).collect());
         match term.place {
             Place::State(i) => {
+                for (_, output, times) in measured.iter().filter(|(state, ..)| *state == i) {
+                    let output = written.outputs.get_mut(*output)?;
+                    output.expression = output.expression.clone() + Expr::Number(*times) * part.clone();
+                }
                 let state = written.states.get_mut(i)?;
                 state.derivative = state.derivative.clone() + part;
             }
@@ -265,9 +275,13 @@ mod tests {
     fn the_response_of_a_term_is_the_derivative_by_its_coefficient() {
         let u = drive(600, &mut normal(3));
         let y = respond(&u, REAL, |_, _| 0.0);
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
-        let simulation = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let a = respond(&drive(600, &mut normal(4)), REAL, |_, _| 0.0);
+        let channels =
+            [("u_N", u), ("x_m", y), ("a_mps2", a)].map(|(name, samples)| Channel { name: name.into(), samples });
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels.into()).unwrap();
+        // One output is the position, the other the acceleration, which holds the forces.
+        let simulation = BASELINE.to_owned() + "a_mps2 = \"(u - c*v - k*x)/m\"\n";
+        let simulation = Simulation::parse(&simulation, "test.sim.toml").unwrap();
         let data = DataSet::new(&simulation, &[recording], 3).unwrap();
         let model = |s: &Simulation| Model::new(s, &data, 2).unwrap();
         let start = Values::default();

@@ -8,7 +8,6 @@ use super::screen::{Candidate, screen};
 use crate::answer::file::DetectableRecord;
 use crate::answer::records::detectability;
 use crate::calibration::lesson::{Done, Lesson, lesson};
-use crate::error::DiagnoseError;
 use crate::evidence::correlation_time;
 use crate::model::base::{Base, NoiseKind};
 use crate::request::{Hooks, Request, words};
@@ -56,22 +55,19 @@ fn clear(pool: &[Hypothesis<'_>]) -> Option<Vec<&'static str>> {
 
 /// Looks for what is missing around a calibrated simulation; where that teaches something of the simulation itself, once more, up to so many
 /// times.
-///
-/// # Errors
-/// A question that names no mechanism or slot.
 pub fn explore<'a, 'd>(
     setting: &Setting<'d>,
     base: Base<'d>,
     request: &Request<'_>,
     hooks: &'a Hooks<'a>,
     lessons: usize,
-) -> Result<Explored<'a, 'd>, DiagnoseError> {
+) -> Explored<'a, 'd> {
     let again = |lesson: Lesson<'d>| {
         (hooks.progress)(lesson.doing);
         let next = Setting { substeps: lesson.substeps, ..setting.clone() };
-        let mut found = explore(&next, lesson.base, request, hooks, lessons - 1)?;
+        let mut found = explore(&next, lesson.base, request, hooks, lessons - 1);
         found.notes.insert(0, lesson.note);
-        Ok(found)
+        found
     };
     let learned = |search: &Search<'_, 'd>, none: &Hypothesis<'d>, pool: &[Hypothesis<'d>], done: Done| {
         (lessons > 0).then(|| lesson(setting, &search.setting, none, pool, done)).flatten()
@@ -180,13 +176,13 @@ pub fn explore<'a, 'd>(
     };
     for question in request.questions {
         (hooks.progress)("weighing what was asked");
-        match search.answer(&none, question)? {
+        match search.answer(&none, question) {
             Some(h) => add(&mut pool, h),
             None => notes.push(format!("{} could not be fitted", words(question))),
         }
     }
     pool.insert(0, none);
-    Ok(Explored { search, pool, candidates, significant, p_value, residual, detectable, least, notes })
+    Explored { search, pool, candidates, significant, p_value, residual, detectable, least, notes }
 }
 
 #[cfg(test)]

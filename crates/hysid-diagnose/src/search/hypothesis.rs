@@ -64,19 +64,20 @@ impl Hypothesis<'_> {
 }
 
 /// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest: log likelihood of the blocks, each row for
-/// the share that it has in the fit, and the sum of squares of each block's rows for the standard error of a difference.
+/// the share that it has in the fit, and each row's square (in units of its output's scale) for the standard error of a difference.
 pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Vec<f64>)> {
     let data = setting.data;
     let weights = held_out_blocks(&data.layout, &data.y);
     let options = LmOptions { iterations: 5, ..LmOptions::default() };
     let fit = go_on(&h.base.model, &h.base.fit, &data.layout, &h.base.whitener, Some(&weights), options)?;
     let white = h.base.whitener.apply(&data.layout, &fit.residual);
+    let scales = data.scales();
     let (mut score, mut squares) = (0.0, Vec::new());
     for s in &data.layout.series {
         let scale = h.base.whitener.models[s.output].log_scale(s.rows.len()) / s.rows.len() as f64;
         for row in s.rows.clone().filter(|&row| weights[row] == 0.0) {
             score -= 0.5 * white[row] * white[row] + scale;
-            squares.push(fit.residual[row] * fit.residual[row]);
+            squares.push((fit.residual[row] / scales[s.output]).powi(2));
         }
     }
     // Rows that are no independent witnesses of the fit are none of the blocks either.

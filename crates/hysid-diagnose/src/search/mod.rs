@@ -20,12 +20,11 @@ pub mod screen;
 pub mod second_look;
 pub mod starts;
 
-use std::cell::{OnceCell, RefCell};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::error::DiagnoseError;
 use crate::evidence::{Contender, FeatureGroup, NoiseModel, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::mechanism::{Family, Mechanism, SLOW};
 use crate::model::base::{Base, NoiseKind};
@@ -96,14 +95,15 @@ pub struct Search<'a, 'd> {
     tests: RefCell<BTreeMap<Key, SurrogateTest>>,
     /// What could be missing around the hypothesis that was tested last: composition mostly extends that one next.
     screened: RefCell<Option<(Key, Vec<Candidate>)>>,
-    /// Generic terms for the simulation without effects: the second look, the verdict and the correction ask for the same ones.
-    open: OnceCell<Option<OpenSet>>,
+    /// Generic terms, by statement: the second look, composition, the verdict and the correction ask for the same ones.
+    open: RefCell<BTreeMap<Key, Option<OpenSet>>>,
 }
 
 impl<'a, 'd> Search<'a, 'd> {
     /// A search that has found nothing yet.
     pub fn new(setting: Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
-        Self { setting, options, hooks, tests: RefCell::default(), screened: RefCell::default(), open: OnceCell::new() }
+        let (tests, screened, open) = (RefCell::default(), RefCell::default(), RefCell::default());
+        Self { setting, options, hooks, tests, screened, open }
     }
 
     /// The simulation without effects under this search's noise model, and what could be missing in it.
@@ -189,30 +189,23 @@ impl<'a, 'd> Search<'a, 'd> {
             .collect()
     }
 
-    /// The set that a question names, fitted one effect after the other; `None` where one of them cannot be fitted.
-    ///
-    /// # Errors
-    /// A mechanism that is not in the catalogue, or a slot that the simulation does not have for it.
-    pub fn answer(&self, none: &Hypothesis<'d>, question: &Question) -> Result<Option<Hypothesis<'d>>, DiagnoseError> {
+    /// The set that a question names, fitted one effect after the other; `None` where one of them cannot be fitted, or is there already.
+    pub fn answer(&self, none: &Hypothesis<'d>, question: &Question) -> Option<Hypothesis<'d>> {
         let mut set: Option<Hypothesis<'d>> = None;
         for (mechanism, slot) in question {
             let parent = set.as_ref().unwrap_or(none);
             let evidence = parent.base.evidence();
             let wanted = |m: &Mechanism, s: &Slot| m.id == *mechanism && s.label == *slot;
             let found = screen(&parent.base, &self.setting.original, &parent.effects, &evidence, &wanted);
-            let Some(candidate) = found.first() else {
-                return Err(DiagnoseError::Question(format!("{mechanism}@{slot}")));
-            };
-            let Some(h) = refit(&self.setting, parent, candidate) else { return Ok(None) };
-            set = Some(h);
+            set = Some(refit(&self.setting, parent, found.first()?)?);
         }
-        Ok(set)
+        set
     }
 
     /// Generic terms for what is left of a hypothesis' residual.
     pub fn open(&self, h: &Hypothesis<'_>) -> Option<OpenSet> {
         let found = || correction(&h.base, self.setting.noise);
-        if h.effects.is_empty() { self.open.get_or_init(found).clone() } else { found() }
+        self.open.borrow_mut().entry(fitted_key(h)).or_insert_with(found).clone()
     }
 
     /// The test of what remains of a hypothesis' residual.

@@ -1,4 +1,4 @@
-//! Is it the simulation's own numerics? Variants of step, hold, clock and smoothing, fitted like any other explanation.
+//! Is it the simulation's own numerics? Variants of hold, clock and smoothing, fitted like any other explanation.
 
 use super::budget::Step;
 use super::hypothesis::{Effect, Hypothesis, Setting};
@@ -11,15 +11,14 @@ const LEAST: f64 = 3.0;
 /// Times that the same kind of variant is applied again (friction smoothed three times too wide may be nine times too wide).
 const AGAIN: usize = 3;
 
-/// The best variant of the numerics as a hypothesis, with the number of steps it asks for; `None` where none gains.
+/// The best variant of the numerics as a hypothesis; `None` where none gains.
 pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypothesis<'d>> {
     let mut best: Option<Hypothesis<'d>> = None;
     for variant in variants(&none.base.document(), setting.data.period_s) {
-        let Some(first) = variant.simulation else { continue };
         if setting.budget.omits(Step::Numerics) {
             break;
         }
-        let mut document = first;
+        let mut document = variant.simulation;
         for round in 0..AGAIN {
             let Some(base) = setting.fit(&document, &none.base.values(), Some(&none.base.whitener), 2, 12) else {
                 break;
@@ -46,7 +45,7 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
             best = Some(Hypothesis { effects: vec![effect], base, log_evidence: evidence });
             // Further the same way.
             let further = variants(&document, setting.data.period_s).into_iter().find(|v| v.what == variant.what);
-            match further.and_then(|v| v.simulation) {
+            match further.map(|v| v.simulation) {
                 Some(next) if round + 1 < AGAIN && variant.what == SHARPER => document = next,
                 _ => break,
             }

@@ -121,7 +121,6 @@ pub fn along(base: &Base<'_>, expressions: &[Expr]) -> Option<Vec<Vec<Vec<f64>>>
 fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Option<Signals>> {
     let data = base.model.data();
     let simulation = base.model.simulation();
-    let values = base.values();
     let constant = |e: &Expr| e.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some());
     let mut expressions: Vec<Expr> = Vec::new();
     let mut place = BTreeMap::new();
@@ -144,7 +143,6 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64]) -> Vec<Opti
         from += s.len();
     }
     let start_s = data.stretches.iter().max_by_key(|s| s.len()).map_or(0.0, |s| s.start_s);
-    let _ = &values;
     structure
         .slots
         .iter()

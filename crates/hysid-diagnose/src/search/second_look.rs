@@ -135,7 +135,8 @@ impl<'d> Search<'_, 'd> {
         }
         let (_, before) = block_score(&self.setting, start)?;
         let (_, after) = block_score(&self.setting, best)?;
-        let p = (better_by_chance(&before, &after)? * fitted.len() as f64).min(1.0);
+        // Too few blocks tell nothing of chance; what they tell of the error remains.
+        let p = better_by_chance(&before, &after).map_or(1.0, |p| (p * fitted.len() as f64).min(1.0));
         let halved = after.iter().sum::<f64>() < HALF * before.iter().sum::<f64>();
         (p < self.options.alpha || halved).then_some(p)
     }

@@ -4,7 +4,7 @@ use hysid_plant::{Expr, Function, Memory, Simulation, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
 use super::motion::{ForcePath, Kinematic, Motion, force_path, kinematic, motions};
-use super::{Place, Slot, Target};
+use super::{Place, Sensed, Slot, Target, sensed};
 
 /// What a simulation is made of, as far as mechanisms care.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +32,12 @@ impl Structure {
         slots.extend(finder.sensors());
         slots.extend(finder.parameters());
         slots.extend(finder.disturbances());
+        let sensed = sensed(original);
         for slot in &mut slots {
+            if let Target::Derivatives(states) = &slot.target {
+                let here = |s: &&Sensed| states.iter().any(|(name, _)| *name == s.state);
+                slot.sensed = sensed.iter().filter(here).cloned().collect();
+            }
             for (i, input) in (1..).zip(&simulation.inputs) {
                 slot.offer(simulation, &format!("u_{i}"), Expr::symbol(&input.symbol));
                 if i == 1 && !slot.has("u") {

@@ -14,6 +14,7 @@ mod find;
 mod forces;
 mod motion;
 mod pattern;
+mod sensed;
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -23,6 +24,7 @@ use hysid_plant::{Expr, Simulation, Unit};
 pub use find::Structure;
 
 pub(crate) use motion::{ForcePath, force_path};
+pub(crate) use sensed::{Sensed, sensed};
 
 /// What kind of place a slot is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -73,6 +75,8 @@ pub struct Slot {
     /// What the law's symbols stand for here.
     symbols: BTreeMap<String, Quantity>,
     pub(crate) target: Target,
+    /// Outputs that measure the derivatives which a force here changes.
+    pub(crate) sensed: Vec<Sensed>,
     /// What is looked through for a mechanism that is already there.
     context: Vec<Expr>,
     inputs: usize,
@@ -104,6 +108,7 @@ impl Slot {
             whereabouts,
             symbols: BTreeMap::new(),
             target,
+            sensed: Vec::new(),
             context: Vec::new(),
             inputs: 0,
             constant: false,

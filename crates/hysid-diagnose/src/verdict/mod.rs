@@ -5,6 +5,7 @@
 //! exactly right: with full weight mean confidence exceeds accuracy.
 
 pub(crate) mod firmness;
+pub(crate) mod judgement;
 pub mod reliability;
 pub(crate) mod weigh;
 
@@ -36,7 +37,7 @@ pub struct Hypothesis {
     pub log_evidence: f64,
 }
 
-/// Probabilities proportional to `exp(weight * log evidence)`, largest evidence first in no particular order.
+/// Probabilities proportional to `exp(weight * log evidence)`, in the order of the evidences.
 pub fn probabilities(log_evidence: &[f64], weight: f64) -> Vec<f64> {
     let top = log_evidence.iter().copied().filter(|e| e.is_finite()).fold(f64::NEG_INFINITY, f64::max);
     if !top.is_finite() {

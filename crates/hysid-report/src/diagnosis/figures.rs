@@ -21,17 +21,12 @@ pub(super) fn role(role: Role) -> &'static str {
     }
 }
 
+/// Shades what was held out: each piece between gaps, since blocks of one recording are pieces too.
 fn shade(mut plot: Plot, record: &RecordPicture) -> Plot {
-    match record.role {
-        Role::HoldOut => {
-            if let (Some(&from), Some(&to)) = (record.time_s.first(), record.time_s.last()) {
-                plot = plot.shaded(from, to, "hold-out");
-            }
-        }
-        Role::Estimation => {
-            for (i, [from, to]) in record.held_out_s.iter().enumerate() {
-                plot = plot.shaded(*from, *to, if i == 0 { "held-out blocks" } else { "" });
-            }
+    if record.role == Role::HoldOut {
+        let entries: Vec<(f64, f64)> = record.time_s.iter().copied().zip(record.measured.iter().copied()).collect();
+        for (i, piece) in entries.split(|(_, y)| y.is_nan()).filter(|piece| !piece.is_empty()).enumerate() {
+            plot = plot.shaded(piece[0].0, piece[piece.len() - 1].0, if i == 0 { "hold-out" } else { "" });
         }
     }
     plot

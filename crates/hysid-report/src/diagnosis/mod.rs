@@ -8,6 +8,7 @@
 mod figures;
 mod words;
 
+use hysid_diagnose::Interval;
 use hysid_diagnose::answer::file::{DiagnosisFile, VerdictKind};
 use hysid_diagnose::answer::picture::{ParameterPicture, Picture};
 
@@ -290,8 +291,13 @@ fn parameters(page: &mut Page, parameters: &[ParameterPicture]) {
         return;
     }
     let found = parameters.iter().any(|p| p.after.is_some());
-    let value = |v: Option<[f64; 3]>| v.map(|v| number(v[0])).unwrap_or_default();
-    let range = |v: Option<[f64; 3]>| v.map(|v| interval(Some(v[1]), Some(v[2]))).unwrap_or_default();
+    let fitted = |i: &Option<Interval>| {
+        let of = |i: &Interval| {
+            let (low, high) = i.low_and_high();
+            [number(i.value), interval(low, high)]
+        };
+        i.as_ref().map(of).unwrap_or_default()
+    };
     let range_heading = ("95 % interval", Align::Right);
     let mut columns = vec![("parameter", Align::Left), ("given", Align::Right)];
     if found {
@@ -304,9 +310,10 @@ fn parameters(page: &mut Page, parameters: &[ParameterPicture]) {
     columns.extend([("unit", Align::Left), ("remark", Align::Left)]);
     let mut table = Table::new(&columns);
     for p in parameters {
-        let mut cells = vec![p.name.clone(), p.given.map(number).unwrap_or_default(), value(p.before), range(p.before)];
+        let mut cells = vec![p.name.clone(), p.given.map(number).unwrap_or_default()];
+        cells.extend(fitted(&p.before));
         if found {
-            cells.extend([value(p.after), range(p.after)]);
+            cells.extend(fitted(&p.after));
         }
         cells.extend([p.unit.clone(), p.remark.clone()]);
         table.row(cells);

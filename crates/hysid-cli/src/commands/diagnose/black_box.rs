@@ -189,20 +189,16 @@ fn windows(recordings: &[Recording], picture: &Picture) -> Vec<Recording> {
     let mut seen = BTreeSet::new();
     for record in picture.records.iter().filter(|r| r.role == Role::Estimation) {
         let Some(recording) = recordings.get(record.place) else { continue };
-        for run in record.samples.chunk_by(|a, b| b - a <= 1) {
+        for run in record.samples.chunk_by(|a, b| b - a <= record.every) {
             let (Some(&from), Some(&to)) = (run.first(), run.last()) else { continue };
             // Each output has the same windows, but for its own gaps.
             if to < from + SHORTEST || !seen.insert((record.place, from)) {
                 continue;
             }
-            let channels = recording
-                .channels()
-                .iter()
-                .map(|c| Channel {
-                    name: c.name.clone(),
-                    samples: c.samples[from..=to.min(c.samples.len() - 1)].to_vec(),
-                })
-                .collect();
+            // An entry that is a mean stands for the samples up to the next.
+            let end = (to + record.every).min(recording.len());
+            let part = |c: &Channel| Channel { name: c.name.clone(), samples: c.samples[from..end].to_vec() };
+            let channels = recording.channels().iter().map(part).collect();
             let clock = Clock { start_s: recording.clock().time(from), ..recording.clock() };
             out.extend(Recording::new(recording.name(), clock, channels));
         }
@@ -250,7 +246,7 @@ mod tests {
             before: measured.clone(),
             after: None,
             noise_rms: 0.0,
-            held_out_s: Vec::new(),
+            every: 1,
             samples,
             scored,
             measured,
@@ -282,9 +278,16 @@ mod tests {
         let mut used = record(samples, vec![false; n], vec![0.0; n]);
         used.role = Role::Estimation;
         let picture = Picture { records: vec![used.clone(), used], ..Picture::default() };
-        let found = windows(&[r], &picture);
+        let found = windows(std::slice::from_ref(&r), &picture);
         assert_eq!(found.len(), 2);
         assert_eq!((found[1].len(), found[1].channels()[0].samples[0], found[1].clock().start_s), (200, 700.0, 75.0));
+        // Where each entry is a mean over ten samples the windows have all of them.
+        let samples: Vec<usize> = (0..=20).chain(70..90).map(|n| 10 * n).collect();
+        let n = samples.len();
+        let thinned =
+            RecordPicture { role: Role::Estimation, every: 10, ..record(samples, vec![false; n], vec![0.0; n]) };
+        let found = windows(&[r], &Picture { records: vec![thinned], ..Picture::default() });
+        assert_eq!(found.iter().map(Recording::len).collect::<Vec<_>>(), [210, 200]);
     }
 
     #[test]

@@ -72,7 +72,7 @@ impl Files<'_> {
         let all = |files: &[PathBuf]| files.iter().map(|f| read(f, options)).collect::<Result<Vec<_>, _>>();
         let intake = Intake { estimation: all(self.estimation)?, holdout: all(self.holdout)? };
         for (h, file) in intake.holdout.iter().zip(self.holdout) {
-            if let Some(e) = intake.estimation.iter().position(|e| same(e, h)) {
+            if let Some(e) = intake.estimation.iter().position(|e| e.same_samples(h)) {
                 return Err(Failure::BadInput(format!(
                     "{}: it holds the same data as {}, which is a --recording; the hold-out must be data that the estimation never sees",
                     file.display(),
@@ -104,14 +104,6 @@ impl Files<'_> {
         }
         Ok(())
     }
-}
-
-/// Whether two recordings hold the same samples, missing ones included.
-fn same(a: &Recording, b: &Recording) -> bool {
-    let bits = |r: &Recording, i: usize| r.channels()[i].samples.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-    a.len() == b.len()
-        && a.channels().len() == b.channels().len()
-        && (0..a.channels().len()).all(|i| a.channels()[i].name == b.channels()[i].name && bits(a, i) == bits(b, i))
 }
 
 fn read(file: &Path, options: &ReadOptions) -> Result<Recording, Failure> {

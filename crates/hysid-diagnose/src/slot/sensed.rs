@@ -1,0 +1,177 @@
+//! Outputs that measure what a force changes at once: an accelerometer's expression holds the forces of the equation of motion, and what is missing
+//! there is missing in the output too.
+
+use hysid_plant::{BinaryOp, ClockSource, Compiled, Drive, Expr, Output, Parameter, Run, Simulation};
+use rand_pcg::rand_core::Rng;
+
+use crate::random::generator;
+
+/// An output that is a multiple of the derivative of a state, but for what no state moves.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sensed {
+    /// The state.
+    pub state: String,
+    /// The output's column.
+    pub column: String,
+    /// The multiple.
+    pub times: f64,
+}
+
+/// Points at which expressions are compared.
+const POINTS: usize = 6;
+/// Difference of two expressions, over their size, that is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// The outputs of a simulation that measure derivatives of its states.
+pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
+    let mut found = Vec::new();
+    for output in &simulation.outputs {
+        let (factor, inner) = peeled(&output.expression);
+        for state in &simulation.states {
+            if shares(simulation, inner, &state.derivative)
+                && let Some(times) = multiple(simulation, inner, &state.derivative)
+            {
+                let (state, column) = (state.name.clone(), output.column.clone());
+                found.push(Sensed { state, column, times: factor * times });
+            }
+        }
+    }
+    found
+}
+
+/// A factor that is a number, and what it multiplies.
+fn peeled(e: &Expr) -> (f64, &Expr) {
+    let under = |n: f64, e| {
+        let (factor, inner) = peeled(e);
+        (n * factor, inner)
+    };
+    match e {
+        Expr::Neg(a) => under(-1.0, a),
+        Expr::Binary(BinaryOp::Mul, a, b) => match (&**a, &**b) {
+            (Expr::Number(n), other) | (other, Expr::Number(n)) => under(*n, other),
+            _ => (1.0, e),
+        },
+        Expr::Binary(BinaryOp::Div, a, b) => match **b {
+            Expr::Number(n) if n != 0.0 => under(1.0 / n, a),
+            _ => (1.0, e),
+        },
+        _ => (1.0, e),
+    }
+}
+
+/// Whether two expressions have a state and a parameter in common: forces in both.
+fn shares(simulation: &Simulation, a: &Expr, b: &Expr) -> bool {
+    let both = |name: &str| a.uses(name) && b.uses(name);
+    simulation.states.iter().any(|s| both(&s.name)) && simulation.parameters.iter().any(|p| both(&p.name))
+}
+
+/// The number by which `b` must be multiplied to move with the states as `a` does; `None` where there is none. It must be the same for other
+/// parameters, and for other numbers in the equations: `v` is a multiple of `(u - 2*v)/3` in one simulation only.
+fn multiple(simulation: &Simulation, a: &Expr, b: &Expr) -> Option<f64> {
+    let mut known: Option<f64> = None;
+    for round in 0..3 {
+        let values = values(simulation, [a, b].map(|e| shaken(e, round)), round)?;
+        let (first, others) = values.split_first()?;
+        let moved: Vec<[f64; 2]> = others.iter().map(|v| [v[0] - first[0], v[1] - first[1]]).collect();
+        let most = |i: usize| moved.iter().map(|m| m[i].abs()).fold(0.0, f64::max);
+        let furthest = moved.iter().max_by(|x, y| x[1].abs().total_cmp(&y[1].abs()))?;
+        let times = furthest[0] / furthest[1];
+        let sizes = values.iter().flatten().map(|v| v.abs()).fold(0.0, f64::max);
+        let same = moved.iter().all(|m| (m[0] - times * m[1]).abs() <= ROUNDING * (most(0) + sizes));
+        let agrees = known.is_none_or(|k| (times - k).abs() <= 1e3 * ROUNDING * k.abs());
+        if !(times.is_finite() && times != 0.0 && same && agrees) {
+            return None;
+        }
+        known = Some(times);
+    }
+    known
+}
+
+/// An expression with other numbers in it, the same ones for the same; exponents stay, since a negative number has no other powers.
+fn shaken(e: &Expr, round: u64) -> Expr {
+    let mut exponents = Vec::new();
+    let held = e.clone().map(&mut |e| match e {
+        Expr::Binary(BinaryOp::Pow, a, b) if matches!(*b, Expr::Number(_)) => {
+            exponents.push(*b);
+            Expr::Binary(BinaryOp::Pow, a, Box::new(Expr::symbol(&format!("?{}", exponents.len() - 1))))
+        }
+        other => other,
+    });
+    let moved = held.map(&mut |e| match e {
+        Expr::Number(n) if n != 0.0 && n != 1.0 => Expr::Number(n * (1.0 + 0.2 * scatter(round, n.to_bits()))),
+        other => other,
+    });
+    exponents.iter().enumerate().fold(moved, |e, (i, n)| e.substitute(&format!("?{i}"), n))
+}
+
+/// Values of two expressions at points that differ in the states only.
+fn values(simulation: &Simulation, expressions: [Expr; 2], round: u64) -> Option<Vec<[f64; 2]>> {
+    let mut probe = simulation.clone();
+    probe.time.clock = ClockSource::Period(1.0);
+    let own = probe.parameters.len();
+    let still = |name: &String| Parameter { fixed: true, ..Parameter::new(name, 0.0) };
+    probe.parameters.extend(simulation.states.iter().map(|s| still(&s.name)));
+    probe.states.clear();
+    // A document refuses outputs that nothing moves.
+    let idle = Expr::Number(0.0) * Expr::symbol(&probe.inputs.first()?.symbol);
+    let output = |(i, e): (usize, Expr)| Output { column: format!("probe_{i}"), expression: e + idle.clone() };
+    probe.outputs = expressions.into_iter().enumerate().map(output).collect();
+    let compiled = Compiled::new(&probe).ok()?;
+    let samples = |i: usize| (0..3).map(|n| scatter(round, 1000 + (10 * i + n) as u64)).collect();
+    let drive = Drive::new(0.0, 1.0, 3, (0..probe.inputs.len()).map(samples).collect()).ok()?;
+    let shaken = |p: &Parameter| p.value * (1.0 + 0.3 * scatter(round, hash(&p.name)));
+    let mut theta: Vec<f64> = probe.parameters.iter().map(shaken).collect();
+    let mut out = Vec::new();
+    for point in 0..POINTS {
+        for (place, state) in theta[own..].iter_mut().enumerate() {
+            *state = scatter(round, (100 * point + place) as u64);
+        }
+        let response = compiled.simulate(&Run::new(&drive, &theta));
+        let at = |o: usize| response.outputs.get(o).and_then(|y| y.get(1)).copied().filter(|y| y.is_finite());
+        out.push([at(0)?, at(1)?]);
+    }
+    Some(out)
+}
+
+/// A number of a name.
+fn hash(name: &str) -> u64 {
+    name.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// A number between -1 and 1 that looks random.
+fn scatter(round: u64, of: u64) -> f64 {
+    2.0 * (generator(round, of).next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(outputs: &str) -> Vec<(String, String, f64)> {
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\na = \"ground_mps2\"\n[parameters]\nm = {{ value = 2.0, min = 0.1 }}\nk = {{ value = 50.0, min = 1.0 }}\n\
+             c = {{ value = 0.3, min = 0.0 }}\n[states]\nx = {{ derivative = \"v\", initial = 0.0 }}\n\
+             v = {{ derivative = \"-(1000*k*x + c*v + 3*x^3)/m - a\", initial = 0.0 }}\nw = {{ derivative = \"(a - 2*w)/3\", initial = 0.0 }}\n[outputs]\n{outputs}\n"
+        );
+        let simulation = Simulation::parse(&text, "test.sim.toml").unwrap();
+        sensed(&simulation).into_iter().map(|s| (s.state, s.column, s.times)).collect()
+    }
+
+    #[test]
+    fn accelerations_are_multiples_of_a_derivative_but_for_the_inputs() {
+        let one = |state: &str, column: &str, times: f64| vec![(state.to_owned(), column.to_owned(), times)];
+        assert_eq!(of("acc = \"-(1000*k*x + c*v + 3*x^3)/m\""), one("v", "acc", 1.0));
+        assert_eq!(of("acc = \"-(1000*k*x + c*v + 3*x^3)/m - a + 0*x\""), one("v", "acc", 1.0));
+        let in_g = of("acc_g = \"(-(3*x^3 + c*v + 1000*k*x)/m + 0.5*a)/9.81\"");
+        assert!(in_g.len() == 1 && (in_g[0].2 - 1.0 / 9.81).abs() < 1e-12, "{in_g:?}");
+    }
+
+    #[test]
+    fn positions_velocities_and_parts_of_the_force_are_none() {
+        for other in
+            ["y = \"x\"", "y = \"1000*v\"", "y = \"1000*k*x + c*v\"", "y = \"w\"", "y = \"k*x/m\"", "y = \"2*w + a\""]
+        {
+            assert!(of(other).is_empty(), "{other}");
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! What is believed of the sets that were fitted: which one is told, how firmly, and what speaks against it.
+
+use super::firmness::{firmness, likelihoods};
+use super::weigh::*;
+use super::{FIRM, Hypothesis as Weighed, Support, verdict};
+use crate::answer::file::{RemainingRecord, VerdictKind};
+use crate::answer::records::lacking;
+use crate::openset::left::Left;
+use crate::openset::uneven::{Uneven, uneven};
+use crate::openset::wanders::{Wanders, wanders};
+use crate::search::explore::Explored;
+use crate::search::hypothesis::Hypothesis;
+use crate::search::leaves_more;
+
+/// What is believed.
+pub struct Judgement<'d> {
+    weighed: Vec<Weighed>,
+    probability: Vec<f64>,
+    /// The set that the evidence prefers, as a place in the pool; the simulation as it is where nothing is significant.
+    pub winner: usize,
+    /// What its residual holds.
+    pub left: Left<'d>,
+    /// The same as it is reported.
+    pub remaining: Option<RemainingRecord>,
+    /// The set whose effects are told: the winner, or the likeliest one where a mismatch is significant and no set outweighs its price.
+    pub told: usize,
+    /// How firmly each of them is told.
+    pub support: Vec<Support>,
+    /// Whether the strength of each member of the winner depends on the motion.
+    pub uneven: Vec<Option<Uneven>>,
+    /// Whether a parameter wanders in the place of a member of the winner.
+    pub wandering: Vec<Option<Wanders>>,
+    /// What the recording lacks for a firm answer about a member of the winner.
+    pub lacking: Vec<Option<String>>,
+    /// What speaks against writing the winner into the simulation, in words.
+    pub veto: Option<&'static str>,
+    /// Whether a mismatch is significant and time was up before a set was found that explains it.
+    pub cut_short: bool,
+    /// The verdict among the sets of the catalogue.
+    pub within: VerdictKind,
+    /// The verdict.
+    pub kind: VerdictKind,
+}
+
+impl<'d> Judgement<'d> {
+    /// Of what a search found.
+    pub fn of(found: &Explored<'_, 'd>) -> Self {
+        let Explored { search, pool, candidates, significant, least, .. } = found;
+        let (setting, significant) = (&search.setting, *significant);
+        let unfinished = || setting.budget.unfinished();
+        let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
+        let blocks = block_scores(setting, pool);
+        let winner = if significant { tie_broken(pool, &blocks) } else { 0 };
+        let left = Left::of(search, pool, winner, significant);
+        let probability = likelihoods(pool, &weighed, &blocks, winner, left.imperfect);
+        let mut support = firmness(pool, &weighed, &probability, winner, left.imperfect);
+        let best = &pool[winner];
+        // Where something is left, or rivals were not heard, nothing is firm anyway, and what is missing looks like a strength that varies.
+        let uneven = if left.imperfect || unfinished() {
+            vec![None; best.effects.len()]
+        } else {
+            uneven(&best.base, setting.noise, &best.effects)
+        };
+        for (s, u) in support.iter_mut().zip(&uneven) {
+            s.discount(u.map_or(0.0, |u| u.probability));
+        }
+        // Nor is a parameter that changes once told from one that wanders by its name alone.
+        let wandering = wanders(search, pool, winner);
+        for (s, w) in support.iter_mut().zip(&wandering) {
+            s.discount(w.as_ref().map_or(0.0, |w| w.probability));
+        }
+        // On four turns a play and a sum of plays are one law: what a law needs to be told from its neighbours it needs to be told firmly.
+        let lacking = lacking(best, candidates);
+        support.iter_mut().zip(&lacking).filter(|(_, l)| l.is_some()).for_each(|(s, _)| s.weaken());
+        // A search that was cut short has not heard all rivals.
+        if unfinished() {
+            support.iter_mut().for_each(Support::weaken);
+        }
+        // A mismatch that is significant stays one, though nothing that was fitted in time explains it.
+        let cut_short = significant && winner == 0 && unfinished();
+        let mut within = if cut_short { VerdictKind::Ambiguous } else { verdict(&support) };
+        let remaining = left.record(pool, winner);
+        let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
+            || wandering.iter().flatten().any(|w| w.probability >= FIRM);
+        let outside = elsewhere || left.is_outside(&support, remaining.as_ref());
+        // Under a noise of its own a simulation may leave more than it has to.
+        let least = least.as_ref().unwrap_or(&pool[0]);
+        let veto = if winner > 0 { veto(best, least, worse_on_blocks(&blocks, winner)) } else { None };
+        if veto.is_some() {
+            within = VerdictKind::Ambiguous;
+            support.iter_mut().for_each(Support::weaken);
+        }
+        let mut kind = if outside && !unfinished() { VerdictKind::NotInCatalogue } else { within };
+        // What is significant stays so, though no set outweighs its price: the likeliest is told, neither believed nor written.
+        let mut told = winner;
+        if significant && kind == VerdictKind::NoSignificantMismatch {
+            kind = VerdictKind::Ambiguous;
+            if let Some(likeliest) = likeliest(&weighed) {
+                told = likeliest;
+                support = firmness(pool, &weighed, &probability, likeliest, true);
+            }
+        }
+        Self {
+            weighed,
+            probability,
+            winner,
+            left,
+            remaining,
+            told,
+            support,
+            uneven,
+            wandering,
+            lacking,
+            veto,
+            cut_short,
+            within,
+            kind,
+        }
+    }
+
+    /// Whether a mismatch is significant that no set of the catalogue, nor any generic term, outweighs its price in explaining.
+    pub fn unexplained(&self) -> bool {
+        self.within == VerdictKind::NoSignificantMismatch && self.kind == VerdictKind::Ambiguous
+    }
+
+    /// What most likely varies in the place of a member of the winner, in words, where that is likelier than the member.
+    pub fn wanders(&self) -> Option<&str> {
+        let likely = self.wandering.iter().flatten().filter(|w| w.probability > 0.5);
+        likely.max_by(|a, b| a.probability.total_cmp(&b.probability)).map(|w| w.words.as_str())
+    }
+
+    /// The sets as they stand against each other.
+    pub fn contest<'a>(&'a self, pool: &'a [Hypothesis<'d>]) -> Contest<'a, 'd> {
+        Contest { pool, weighed: &self.weighed, probability: &self.probability, winner: self.winner }
+    }
+}
+
+/// What speaks against writing a set into the simulation, in words; `least` is the simulation as it is with the least error.
+fn veto(best: &Hypothesis<'_>, least: &Hypothesis<'_>, worse_on_blocks: bool) -> Option<&'static str> {
+    if worse_on_blocks {
+        Some(
+            "the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to",
+        )
+    } else if leaves_more(best, least) {
+        Some(
+            "the best set of effects leaves a larger error than the simulation as it is, and what it gains is that the error looks more like noise: it explains nothing",
+        )
+    } else {
+        None
+    }
+}
