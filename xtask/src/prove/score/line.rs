@@ -34,62 +34,82 @@ pub struct Line {
     pub share: bool,
 }
 
-pub(super) fn share(what: &str, target: &str, hits: usize, n: usize, limit: f64, most: bool, gate: bool) -> Line {
-    let value = if n == 0 { f64::NAN } else { hits as f64 / n as f64 };
-    let standing = match n {
-        0 => Standing::Open,
-        _ if (most && value <= limit) || (!most && value >= limit) => Standing::Met,
-        _ => Standing::Missed,
-    };
-    Line { what: what.into(), target: target.into(), value, interval: wilson(hits, n), n, standing, gate, share: true }
+/// What a line is held against.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Target {
+    /// Nothing: another line is read beside it.
+    None,
+    /// No more than this.
+    AtMost(f64),
+    /// No less than this.
+    AtLeast(f64),
+    /// Between these.
+    Within(f64, f64),
 }
 
-pub(super) fn figure(what: &str, target: &str, values: &[f64], q: f64, limit: f64, gate: bool) -> Line {
-    let value = quantile(values, q);
-    let standing = match values.len() {
-        0 => Standing::Open,
-        _ if value <= limit => Standing::Met,
-        _ => Standing::Missed,
-    };
-    Line {
-        what: what.into(),
-        target: target.into(),
-        value,
-        interval: quantile_interval(values, q),
-        n: values.len(),
-        standing,
-        gate,
-        share: false,
+impl Target {
+    fn standing(self, value: f64, n: usize) -> Standing {
+        let met = match self {
+            Self::None => return Standing::Open,
+            Self::AtMost(limit) => value <= limit,
+            Self::AtLeast(limit) => value >= limit,
+            Self::Within(low, high) => (low..=high).contains(&value),
+        };
+        match n {
+            0 => Standing::Open,
+            _ if met => Standing::Met,
+            _ => Standing::Missed,
+        }
+    }
+
+    /// In words, of a share in percent.
+    fn words(self, share: bool) -> String {
+        // As many digits as the number has: 1.5 %, 97 %.
+        let of = |x: f64| if share { format!("{}", (1e4 * x).round() / 1e2) } else { format!("{x}") };
+        let unit = if share { " %" } else { "" };
+        match self {
+            Self::None => "-".into(),
+            Self::AtMost(limit) => format!("<= {}{unit}", of(limit)),
+            Self::AtLeast(limit) => format!(">= {}{unit}", of(limit)),
+            Self::Within(low, high) => format!("{} to {}{unit}", of(low), of(high)),
+        }
     }
 }
 
-pub(super) fn plain(what: &str, target: &str, value: f64, n: usize, limit: f64) -> Line {
-    let standing = if n == 0 {
-        Standing::Open
-    } else if value <= limit {
-        Standing::Met
-    } else {
-        Standing::Missed
-    };
-    Line {
-        what: what.into(),
-        target: target.into(),
-        value,
-        interval: (f64::NAN, f64::NAN),
-        n,
-        standing,
-        gate: false,
-        share: false,
+impl Line {
+    /// A share of cases.
+    pub(super) fn share(what: &str, (hits, n): (usize, usize), target: Target) -> Self {
+        let value = if n == 0 { f64::NAN } else { hits as f64 / n as f64 };
+        Self {
+            interval: wilson(hits, n),
+            share: true,
+            target: target.words(true),
+            ..Self::plain(what, value, n, target)
+        }
     }
-}
 
-/// A figure without a target, beside which another is read.
-pub(super) fn beside(what: &str, value: f64, n: usize) -> Line {
-    Line { standing: Standing::Open, ..plain(what, "-", value, n, f64::INFINITY) }
-}
+    /// A quantile of figures.
+    pub(super) fn figure(what: &str, values: &[f64], q: f64, target: Target) -> Self {
+        let interval = quantile_interval(values, q);
+        Self { interval, ..Self::plain(what, quantile(values, q), values.len(), target) }
+    }
 
-pub(super) fn told(what: &str, hits: usize, n: usize) -> Line {
-    let mut line = share(what, "-", hits, n, 0.0, false, false);
-    line.standing = Standing::Open;
-    line
+    /// A figure without an interval.
+    pub(super) fn plain(what: &str, value: f64, n: usize, target: Target) -> Self {
+        Self {
+            what: what.into(),
+            target: target.words(false),
+            value,
+            interval: (f64::NAN, f64::NAN),
+            n,
+            standing: target.standing(value, n),
+            gate: false,
+            share: false,
+        }
+    }
+
+    /// The same as one of the first five, which pass or fail.
+    pub(super) fn gate(self) -> Self {
+        Self { gate: true, ..self }
+    }
 }
