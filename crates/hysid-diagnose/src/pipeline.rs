@@ -3,10 +3,9 @@
 use hysid_plant::Simulation;
 
 use crate::answer::draw::{Sitting, picture};
-use crate::answer::file::*;
 use crate::answer::picture::Picture;
 use crate::answer::records::*;
-use crate::answer::text::number;
+use crate::budget::{Budget, Step};
 use crate::calibration::fair::calibrate;
 use crate::data::DataSet;
 use crate::data::glitches::{mended, told};
@@ -15,14 +14,15 @@ use crate::error::DiagnoseError;
 use crate::evidence::NoiseModel;
 use crate::experiment::fresh::gamble;
 use crate::experiment::separating;
+use crate::file::*;
 use crate::model::Count;
 use crate::model::base::NoiseKind;
 use crate::model::force::pushed;
 use crate::model::hold::free_run;
+use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::request::{Hooks, Request};
-use crate::search::budget::{Budget, Step};
 use crate::search::explore::{Explored, LESSONS, explore};
-use crate::search::hypothesis::{Hypothesis, Setting};
+use crate::text::number;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
 
@@ -83,11 +83,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let (search, pool) = (&found.search, &found.pool);
     let (setting, best) = (&search.setting, &pool[judged.winner]);
     let wanders = judged.wanders().map(str::to_owned);
-    let Judgement { left, uneven, wandering, lacking, cut_short, .. } = judged;
-    let spectrum = left
+    let Judgement { rest, uneven, wandering, lacking, cut_short, .. } = judged;
+    let spectrum = rest
         .spectrum
         .then_some("a memory with many time scales, a fractional element or a spectrum of relaxation times");
-    let (correction, varying) = left.believed().unzip();
+    let (correction, varying) = rest.believed().unzip();
     file.correction = correction;
     // What is not of the catalogue lives where the correction acts, not where an effect imitates it.
     if let (VerdictKind::NotInCatalogue, Some(location), Some(c)) = (file.verdict, &mut file.location, &file.correction)
@@ -214,7 +214,7 @@ fn written<'d>(
     hooks: &Hooks<'_>,
 ) -> Written<'d> {
     let (search, pool) = (&found.search, &found.pool);
-    let (winner, vetoed, foreign) = (judged.winner, judged.veto.is_some(), judged.left.foreign);
+    let (winner, vetoed, foreign) = (judged.winner, judged.veto.is_some(), judged.rest.foreign);
     let risk = if winner > 0 && !vetoed { gamble(&search.setting, &judged.contest(pool)) } else { None };
     if let Some(share) = risk {
         file.notes.push(format!("on the recorded inputs mirrored and reversed in time the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): no augmented simulation is written, since it may be worse than nothing there", number(share)));
@@ -227,13 +227,13 @@ fn written<'d>(
     let set = if winner > 0 && !vetoed && risk.is_none() && !foreign && wanders.is_none() { winner } else { 0 };
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {
         (hooks.progress)("writing the correction into the simulation");
-        judged.left.modelled(search, pool, winner, set)
+        judged.rest.modelled(search, pool, winner, set)
     } else {
         None
     };
     let note = if modelled.is_some() {
         "the augmented simulation holds the sparse correction, refitted, and no physics that has a name: it predicts blocks of the recordings that it was not fitted to better, and says nothing outside their range"
-    } else if judged.left.spectrum {
+    } else if judged.rest.spectrum {
         "several relaxations stand beside each other: a memory with many time scales (a fractional element, a spectrum of relaxation times), which the catalogue does not have; within the band of the recording their sum follows it"
     } else if foreign && !vetoed && search.setting.budget.unfinished() {
         "generic terms explain far more than the effects that were fitted in time; no augmented simulation is written"

@@ -7,7 +7,7 @@ mod oscillator;
 #[path = "diagnose/store.rs"]
 mod store;
 
-use hysid_diagnose::answer::file::VerdictKind;
+use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Request, diagnose};
 use hysid_plant::{Compiled, Drive, Run, Simulation};
 use hysid_signal::{Channel, Clock, Recording};

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use hysid_diagnose::answer::file::*;
 use hysid_diagnose::answer::picture::{MapPicture, Picture, RecordPicture, Role};
+use hysid_diagnose::file::*;
 use hysid_report::Provenance;
 use hysid_report::diagnosis::page;
 

@@ -6,10 +6,10 @@ use hysid_signal::power_spectrum;
 use super::picture::{LawPicture, MapPicture, ParameterPicture, Picture, RecordPicture, Role, SpectrumPicture};
 use crate::data::DataSet;
 use crate::mechanism::Block;
+use crate::model::along;
 use crate::model::base::{Base, Interval};
 use crate::model::hold::FreeRun;
-use crate::search::hypothesis::Hypothesis;
-use crate::search::screen::along;
+use crate::model::hypothesis::Hypothesis;
 use crate::slot::Structure;
 
 /// Cells of a map along each axis.

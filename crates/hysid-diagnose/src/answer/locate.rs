@@ -98,7 +98,7 @@ pub fn region(coordinates: &[Coordinate], weight: &[f64]) -> Option<String> {
         absolute.sort_by(f64::total_cmp);
         let q = |s: &[f64], p: f64| s.get(((s.len() as f64 - 1.0) * p) as usize).copied().unwrap_or(0.0);
         let scale = q(&absolute, 0.99);
-        let number = |x: f64| super::text::number(x);
+        let number = |x: f64| crate::text::number(x);
         let unit = if c.unit.is_empty() { String::new() } else { format!(" {}", c.unit) };
         let s = &c.symbol;
         let mut offer = |inside: &dyn Fn(f64) -> bool, words: String| {

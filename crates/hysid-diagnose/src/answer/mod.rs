@@ -2,10 +2,8 @@
 
 pub(crate) mod bootstrap;
 pub(crate) mod draw;
-pub mod file;
 mod locate;
 pub mod picture;
 pub(crate) mod records;
 mod region;
 mod report_values;
-pub(crate) mod text;

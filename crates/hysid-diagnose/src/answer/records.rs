@@ -5,16 +5,15 @@ use std::collections::BTreeMap;
 use hysid_plant::{Expr, Simulation};
 
 use super::bootstrap::{ratio_of_rms, rms};
-use super::file::*;
 use super::locate;
 use super::report_values::{reported, sentence};
 use crate::data::DataSet;
-use crate::evidence::{FeatureGroup, detectable_amplitude};
+use crate::file::*;
 use crate::mechanism::{Block, number_with_unit};
 use crate::model::base::{Base, Interval};
 use crate::model::hold::FreeRun;
+use crate::model::hypothesis::{Effect, Hypothesis};
 use crate::request::{Question, words};
-use crate::search::hypothesis::{Effect, Hypothesis};
 use crate::search::screen::Candidate;
 use crate::verdict::Support;
 use crate::verdict::weigh::Contest;
@@ -22,37 +21,6 @@ use crate::verdict::weigh::Contest;
 /// Values of the outputs by their columns.
 pub fn by_column(simulation: &Simulation, values: &[f64]) -> BTreeMap<String, f64> {
     simulation.outputs.iter().map(|o| o.column.clone()).zip(values.iter().copied()).collect()
-}
-
-/// The smallest effects that this recording would have shown.
-pub fn detectability(candidates: &[Candidate]) -> Vec<DetectableRecord> {
-    let count: usize = candidates.iter().map(|c| c.points.len()).sum();
-    let mut out: Vec<DetectableRecord> = candidates
-        .iter()
-        .filter_map(|c| {
-            let amplitude = c.refit.amplitudes.first()?;
-            let point = c.points.iter().filter(|p| p.norm > 0.0).max_by(|a, b| a.norm.total_cmp(&b.norm))?;
-            let group = FeatureGroup::of_norm(point.norm);
-            let unit = c
-                .refit
-                .simulation
-                .parameter(&amplitude.name)?
-                .unit
-                .as_ref()
-                .map(ToString::to_string)
-                .unwrap_or_default();
-            let smallest = detectable_amplitude(&group, 1.0, count);
-            smallest.is_finite().then(|| DetectableRecord {
-                mechanism: c.mechanism.id.into(),
-                slot: c.slot.label.clone(),
-                smallest,
-                unit,
-            })
-        })
-        .collect();
-    out.sort_by(|a, b| (&a.slot, &a.mechanism).cmp(&(&b.slot, &b.mechanism)));
-    out.dedup_by(|a, b| a.mechanism == b.mechanism && a.slot == b.slot);
-    out
 }
 
 /// The effects of the best set.
@@ -81,16 +49,6 @@ pub fn from_moment(effects: &[EffectRecord], data: &DataSet) -> Option<[f64; 2]>
     let moment = changes().find_map(|e| e.parameters.iter().find(|p| p.name == "t_0"))?;
     let last = data.stretches.iter().rfind(|s| s.recording == 0)?;
     Some([moment.value, last.start_s + last.len() as f64 * data.period_s])
-}
-
-/// What the recording lacks for a firm answer about each effect of the best set; `None` where nothing is lacking.
-pub fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String>> {
-    let told = |e: &Effect| {
-        let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?;
-        let lacking = candidate.lacking.as_ref()?;
-        Some(format!("{}: for a firm answer the recording lacks something: {lacking}", e.mechanism.id))
-    };
-    best.effects.iter().map(told).collect()
 }
 
 /// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it.

@@ -4,8 +4,8 @@ use hysid_plant::Expr;
 
 use super::locate::{Coordinate, region};
 use crate::evidence::Projector;
-use crate::search::hypothesis::Hypothesis;
-use crate::search::screen::along;
+use crate::model::along;
+use crate::model::hypothesis::Hypothesis;
 
 /// What the effects of `best` add, along the augmented trajectory: where to (`d(v)/dt`, or an output's column), and the difference of the
 /// first equation that changed.

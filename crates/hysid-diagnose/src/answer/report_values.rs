@@ -2,10 +2,10 @@
 
 use hysid_plant::{ClockSource, Compiled, Drive, Expr, Input, Output, Run, Simulation};
 
-use super::file::{ParameterRecord, finite};
+use crate::file::{ParameterRecord, finite};
 use crate::mechanism::Value;
 use crate::model::base::Base;
-use crate::search::hypothesis::Effect;
+use crate::model::hypothesis::Effect;
 
 /// Values of expressions of parameters only.
 fn evaluate(document: &Simulation, expressions: &[Expr], theta: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {

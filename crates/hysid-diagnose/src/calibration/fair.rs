@@ -3,9 +3,9 @@
 use super::global::starts;
 use crate::error::DiagnoseError;
 use crate::model::base::Base;
+use crate::model::hypothesis::Setting;
 use crate::model::{Model, Values};
 use crate::request::Request;
-use crate::search::hypothesis::Setting;
 
 /// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
 pub const WORSE: f64 = 1.05;

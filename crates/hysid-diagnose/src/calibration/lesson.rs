@@ -10,7 +10,7 @@ use super::global::MOST_SUBSTEPS;
 use crate::evidence::norm2;
 use crate::model::Model;
 use crate::model::base::Base;
-use crate::search::hypothesis::{Hypothesis, Setting};
+use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// Sets, the likeliest first, that are asked.
 const ASKED: usize = 3;
@@ -160,12 +160,12 @@ mod tests {
     use hysid_signal::{Channel, Clock, Recording};
 
     use super::*;
+    use crate::budget::Budget;
     use crate::data::DataSet;
     use crate::model::Values;
     use crate::model::base::NoiseKind;
-    use crate::search::budget::Budget;
+    use crate::model::hypothesis::calibrated;
     use crate::search::fitting::refit;
-    use crate::search::hypothesis::calibrated;
     use crate::search::screen::screen;
     use crate::verdict::weigh::oscillator::{normal, rms};
 

@@ -11,11 +11,11 @@ use hysid_plant::{BinaryOp, Expr, Simulation};
 use hysid_signal::{Channel, Recording};
 
 use crate::answer::bootstrap::rms;
-use crate::answer::file::ParameterRecord;
-use crate::answer::text::number;
 use crate::calibration::global::calibrated_copy;
 use crate::data::DataSet;
 use crate::error::DiagnoseError;
+use crate::file::ParameterRecord;
+use crate::text::number;
 use clones::{Wanted, meaning, quoted};
 
 /// A clone is taken where its error is below this share of the column's rms about its mean.

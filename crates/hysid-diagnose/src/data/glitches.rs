@@ -7,8 +7,8 @@
 use hysid_plant::{Expr, Simulation};
 
 use super::DataSet;
-use crate::answer::text::number;
 use crate::evidence::Series;
+use crate::text::number;
 
 /// Deviations from the mean of its neighbours, in standard deviations of what all samples have, beyond which a sample is none of them: less than
 /// once in a million samples of white noise.

@@ -11,6 +11,7 @@
 
 mod ar;
 mod below;
+mod blocks;
 mod constancy;
 mod driven;
 mod layout;
@@ -22,6 +23,7 @@ mod shape;
 mod surrogate;
 
 pub use ar::{AR_ORDERS, ArModel, fit_ar};
+pub use blocks::{better_by_chance, difference};
 pub use constancy::{Wander, lines};
 pub use layout::{Layout, Series, Whitener};
 pub use noise::NoiseModel;

@@ -13,8 +13,8 @@ use hysid_plant::{Drive, Initial, Simulation};
 
 use crate::data::DataSet;
 use crate::model::base::Base;
+use crate::model::hypothesis::Setting;
 use crate::model::{Model, Values};
-use crate::search::hypothesis::Setting;
 use crate::verdict::weigh::Contest;
 
 /// Share that a set may have on average of what it and nothing would lose. Below a half: the truth may be none of the sets that were fitted.

@@ -13,16 +13,16 @@ use hysid_plant::{Drive, Simulation};
 use hysid_signal::Excitation;
 use rayon::prelude::*;
 
-use crate::answer::file::{AlternativeRecord, ExperimentRecord, finite};
-use crate::answer::text::number;
+use crate::budget::Step;
 use crate::data::DataSet;
 use crate::evidence::{Whitener, norm2};
+use crate::file::{AlternativeRecord, ExperimentRecord, finite};
 use crate::mechanism::excited_band;
 use crate::model::base::Base;
+use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::model::{Model, Values};
 use crate::refit::{LmOptions, levenberg_marquardt};
-use crate::search::budget::Step;
-use crate::search::hypothesis::{Hypothesis, Setting};
+use crate::text::number;
 use crate::verdict::weigh::{Contest, SETTLED, rivals_of, settled};
 use fresh::{answered, started};
 

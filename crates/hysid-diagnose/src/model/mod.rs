@@ -4,9 +4,11 @@
 //! that begins in the middle of a recording, the initial values of all states: what an effect remembers there is as unknown as the motion.
 
 mod adjoint;
+mod along;
 pub mod base;
 pub mod force;
 pub mod hold;
+pub mod hypothesis;
 mod unknowns;
 
 use hysid_plant::{Compiled, Direction, Expr, Initial, Run, Sensitivity, Simulation, Start};
@@ -14,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::data::DataSet;
 use crate::refit::Problem;
+pub use along::along;
 use unknowns::slope;
 pub use unknowns::{Count, Unknown, Values};
 

@@ -10,26 +10,24 @@
 //! MSSP 75 (2016): memory without rate needs an operator with memory, which no static term imitates.
 
 mod course;
-pub mod left;
 mod modulation;
-mod needed;
+pub mod needed;
 mod regress;
 mod shapes;
 mod signature;
 mod terms;
 pub mod uneven;
-mod varying;
+pub mod varying;
 mod view;
-pub mod wanders;
 mod written;
 
 use hysid_linalg::Matrix;
 use hysid_plant::Simulation;
 use hysid_select::{Criterion, Options as Selecting, select};
 
-use crate::answer::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::data::held_out_blocks;
 use crate::evidence::{Whitener, norm2};
+use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use regress::regress;
@@ -71,7 +69,7 @@ impl OpenSet {
     }
 
     /// Its terms, where it is made of such.
-    fn sparse(&self) -> Option<&Sparse> {
+    pub fn sparse(&self) -> Option<&Sparse> {
         match &self.writable {
             Some(Writable::Sparse(terms)) => Some(terms),
             _ => None,
@@ -124,7 +122,7 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
 
 /// The noise models under which a correction is looked for: the fit's own, and plain squares where that is coloured and may have taken mismatch for
 /// noise.
-fn noises(base: &Base<'_>, kind: NoiseKind) -> Vec<Whitener> {
+pub fn noises(base: &Base<'_>, kind: NoiseKind) -> Vec<Whitener> {
     let mut noises = vec![base.whitener.clone()];
     if kind == NoiseKind::Coloured && base.coloured() {
         noises.push(base.model.data().layout.fit_noise(&base.fit.residual, 0, &[]));

@@ -8,12 +8,12 @@ use hysid_plant::Simulation;
 
 use super::written::Sparse;
 use super::{Writable, correction};
-use crate::answer::file::TermRecord;
+use crate::budget::Step;
 use crate::evidence::{dot, norm2};
+use crate::file::TermRecord;
 use crate::model::Values;
 use crate::model::base::Base;
-use crate::search::budget::Step;
-use crate::search::hypothesis::{Hypothesis, Setting};
+use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// A correction that was refitted in the equations.
 pub struct Refitted<'d> {

@@ -7,8 +7,8 @@ use hysid_plant::{Expr, Function};
 
 use super::course::Series;
 use super::written::FORM;
-use crate::answer::text::number;
 use crate::data::{DataSet, Stretch};
+use crate::text::number;
 
 /// What a generic term is a function of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

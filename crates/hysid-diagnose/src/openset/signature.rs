@@ -3,8 +3,8 @@
 use super::shapes::Kind;
 use super::terms::Term;
 use super::view::View;
-use crate::answer::file::SignatureRecord;
 use crate::evidence::{Whitener, norm2};
+use crate::file::SignatureRecord;
 use crate::model::base::Base;
 
 /// The signature: which families of terms see the residual.

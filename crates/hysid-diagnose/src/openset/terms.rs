@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::course::Series;
 use super::shapes::{self, Kind, Shape, held_beyond};
+use crate::model::along;
 use crate::model::base::Base;
-use crate::search::screen::along;
 use crate::slot::{Sensed, Structure, sensed};
 
 /// A generic signal before it is pushed through the simulation.

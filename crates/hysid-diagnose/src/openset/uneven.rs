@@ -10,11 +10,11 @@
 
 use hysid_plant::Expr;
 
-use crate::answer::text::number;
 use crate::evidence::{dot, norm2};
+use crate::model::along;
 use crate::model::base::{Base, NoiseKind};
-use crate::search::hypothesis::Effect;
-use crate::search::screen::along;
+use crate::model::hypothesis::Effect;
+use crate::text::number;
 
 use super::modulation::Modulated;
 use super::view::View;
@@ -130,9 +130,9 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
+    use crate::budget::Budget;
     use crate::data::DataSet;
-    use crate::search::budget::Budget;
-    use crate::search::hypothesis::calibrated;
+    use crate::model::hypothesis::calibrated;
 
     /// What an oscillator with dry friction, whose level is multiplied by a function of the position, looks like to a simulation that has dry friction.
     fn found(seed: u64, factor: fn(f64) -> f64, noise: f64) -> Uneven {

@@ -13,12 +13,12 @@ use super::course::{COURSES, Course, Series, Time};
 use super::modulation::{Modulated, modulated};
 use super::regress::regress;
 use super::view::View;
-use crate::answer::text::number;
 use crate::evidence::{Wander, Whitener, dot, lines, norm2};
 use crate::mechanism::SLOW;
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use crate::random::generator;
+use crate::text::number;
 
 /// Lines of each parameter whose responses are taken, and of these how many are judged with a noise model of their own.
 const LINES: (usize, usize) = (4, 2);
@@ -237,7 +237,7 @@ fn judged(
 mod oscillator;
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use std::cell::Cell;
     use std::f64::consts::TAU;
 

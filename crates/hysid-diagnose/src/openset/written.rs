@@ -11,7 +11,7 @@ use super::course::{Course, phases};
 use super::modulation::multiply;
 use super::terms::{Coordinate, Term, measured};
 use super::varying::Varying;
-use crate::answer::text::number;
+use crate::text::number;
 
 /// How far a coefficient may move from where the regression on the tangent found it, over its own size.
 const REACH: f64 = 10.0;

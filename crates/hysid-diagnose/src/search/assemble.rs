@@ -1,12 +1,12 @@
 //! Sets of effects written into a simulation together: from parts with start values to a hypothesis, on to its end, and without one of them.
 
 use super::finish::finish;
-use super::hypothesis::{Effect, Hypothesis, Setting};
 use super::screen::{Candidate, rewrite_at, with_added_starts};
 use super::starts::{set, starts};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Purpose};
 use crate::model::Values;
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
 /// An effect to be written: the mechanism, the slot's name, values of its parameters in the order of the law.
 pub struct Part {

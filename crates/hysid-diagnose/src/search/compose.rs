@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::assemble::{Part, assemble, complete, without};
-use super::budget::Step;
 use super::finer::finer;
 use super::fitting::{HOPELESS, refit_all};
-use super::hypothesis::{Effect, Hypothesis, Key, Setting};
 use super::joint::pairs;
 use super::screen::Candidate;
+use crate::budget::Step;
 use crate::mechanism::Mechanism;
+use crate::model::hypothesis::{Effect, Hypothesis, Key, Setting};
 
 /// The candidates worth a refit: the best by score, at most `most`, and one for each slot and family that is not far behind.
 pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {

@@ -1,15 +1,15 @@
 //! Everything that is looked for on one calibration: test, second look, refits, composition, the sets that were asked for.
 
 use super::Search;
-use super::budget::Step;
 use super::compose::{add, best_of};
-use super::hypothesis::{Hypothesis, Setting};
+use super::detectable::detectability;
 use super::screen::{Candidate, screen};
-use crate::answer::file::DetectableRecord;
-use crate::answer::records::detectability;
+use crate::budget::Step;
 use crate::calibration::lesson::{Done, Lesson, lesson};
 use crate::evidence::correlation_time;
+use crate::file::DetectableRecord;
 use crate::model::base::{Base, NoiseKind};
+use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::request::{Hooks, Request, words};
 
 /// What was found on one calibration.

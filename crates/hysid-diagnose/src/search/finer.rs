@@ -5,12 +5,12 @@
 //! what three leave would pass for another effect. The evidence decides, so that no recording pays for terms that it cannot tell.
 
 use super::assemble::{Part, assemble};
-use super::budget::Step;
 use super::finish::finish;
-use super::hypothesis::{Effect, Hypothesis, Setting};
 use super::screen::rewrite_at;
+use crate::budget::Step;
 use crate::mechanism::{Law, Purpose, Role};
 use crate::model::Values;
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
 /// Log evidence that an effect must have brought before a form with more unknowns is tried.
 const WORTH_REFINING: f64 = 10.0;

@@ -3,9 +3,9 @@
 
 use rayon::prelude::*;
 
-use super::budget::Step;
-use super::hypothesis::{Hypothesis, Setting};
+use crate::budget::Step;
 use crate::model::base::Base;
+use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// The end of a fit: shapes that least squares cannot move, of the effects from `from` on, then a round under the hypothesis' own noise.
 pub fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {

@@ -4,14 +4,14 @@
 
 use rayon::prelude::*;
 
-use super::budget::Step;
 use super::finer::finer;
 use super::finish::finish;
-use super::hypothesis::{Effect, Hypothesis, Setting};
 use super::screen::{Candidate, with_added_starts};
 use super::starts::{set, starting_values, starts};
+use crate::budget::Step;
 use crate::model::Values;
 use crate::model::base::Base;
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
 /// A few iterations from a candidate's best start, the first of `froms`; from the last two as well (the user's own parameters and a global
 /// calibration) where the fit without the effect is far off.

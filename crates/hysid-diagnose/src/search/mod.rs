@@ -5,13 +5,12 @@
 //! setting of its fits (`hypothesis`), and the time (`budget`).
 
 pub mod assemble;
-pub mod budget;
 pub mod compose;
+pub mod detectable;
 pub mod explore;
 pub mod finer;
 pub mod finish;
 pub mod fitting;
-pub mod hypothesis;
 pub mod joint;
 pub mod numerics_check;
 pub mod peaks;
@@ -25,16 +24,16 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use crate::budget::Step;
 use crate::evidence::{Contender, FeatureGroup, NoiseModel, Projector, SurrogateTest, TestOptions, surrogate_test};
 use crate::mechanism::{Family, Mechanism, SLOW};
 use crate::model::base::{Base, NoiseKind};
+use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::openset::{ODDS_AGAINST_MORE, OpenSet, correction};
 use crate::request::{Hooks, Options, Question};
 use crate::slot::Slot;
-use budget::Step;
 use compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short_list, unheard};
 use fitting::{refit, refit_all, refit_wider};
-use hypothesis::{Hypothesis, Key, Setting};
 use screen::{Candidate, screen};
 
 /// Composition goes on while the mismatch that remains is significant at this level.
@@ -293,9 +292,9 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
+    use crate::budget::Budget;
     use crate::data::DataSet;
-    use crate::search::budget::Budget;
-    use crate::search::hypothesis::calibrated;
+    use crate::model::hypothesis::calibrated;
 
     /// What may have been absorbed, and the largest score of the same under the noise model's own eyes, where this is added to an oscillator's
     /// output, in multiples of white noise, by the time in seconds.

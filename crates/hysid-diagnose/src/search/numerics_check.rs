@@ -1,9 +1,9 @@
 //! Is it the simulation's own numerics? Variants of hold, clock and smoothing, fitted like any other explanation.
 
-use super::budget::Step;
-use super::hypothesis::{Effect, Hypothesis, Setting};
+use crate::budget::Step;
 use crate::mechanism::numerics::{SHARPER, SOLVER_ARTEFACT, variants};
 use crate::mechanism::{Purpose, Rewritten};
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 use crate::slot::{Slot, Structure};
 
 /// Log likelihood that a variant must gain to be listed at all.

@@ -12,14 +12,14 @@
 use rand::RngExt;
 use rayon::prelude::*;
 
-use super::budget::Step;
-use super::hypothesis::{Hypothesis, Setting};
 use super::peaks::lines_of;
 use super::screen::{Candidate, Point, with_added_starts};
 use super::starts::set;
+use crate::budget::Step;
 use crate::data::DataSet;
 use crate::evidence::{Projector, norm2, surprise};
 use crate::model::base::{Base, spared};
+use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::random::generator;
 
 /// Effects that are fitted, from each list of candidates.
@@ -190,9 +190,9 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
+    use crate::budget::Budget;
     use crate::model::base::NoiseKind;
-    use crate::search::budget::Budget;
-    use crate::search::hypothesis::calibrated;
+    use crate::model::hypothesis::calibrated;
     use crate::search::screen::screen;
 
     proptest! {

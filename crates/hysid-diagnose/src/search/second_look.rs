@@ -7,15 +7,15 @@
 use super::Search;
 use super::compose::{short_list, superposed};
 use super::fitting::refit_all;
-use super::hypothesis::{Effect, Hypothesis, block_score};
 use super::peaks::lines_of;
 use super::rehearsal::by_rehearsal;
 use super::screen::Candidate;
 use crate::evidence::NoiseModel;
+use crate::evidence::better_by_chance;
 use crate::mechanism::{Places, SLOW};
 use crate::model::base::spared;
+use crate::model::hypothesis::{Effect, Hypothesis, block_score};
 use crate::openset::ODDS_AGAINST;
-use crate::verdict::weigh::better_by_chance;
 
 /// Effects and pairs that are fitted for a second look.
 const LOOKED_AT: (usize, usize) = (5, 4);

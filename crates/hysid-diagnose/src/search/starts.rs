@@ -2,12 +2,12 @@
 
 use hysid_plant::Simulation;
 
-use super::budget::Step;
-use super::hypothesis::{Hypothesis, Setting};
 use super::screen::{Candidate, Point, with_added_starts};
+use crate::budget::Step;
 use crate::calibration::global::calibrated_copy;
 use crate::calibration::unfold::calibrated_unfolded;
 use crate::model::Values;
+use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// Points of a shape grid that a refit starts from.
 const MOST_POINTS: usize = 3;

@@ -3,7 +3,7 @@
 use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights};
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::mechanism::Family;
-use crate::search::hypothesis::Hypothesis;
+use crate::model::hypothesis::Hypothesis;
 
 /// Share of the set's log evidence that a member must bring: laws are written only so exactly, and beside a large effect the rest of its own
 /// law looks like a small one.

@@ -1,16 +1,16 @@
 //! What is believed of the sets that were fitted: which one is told, how firmly, and what speaks against it.
 
 use super::firmness::{firmness, likelihoods};
+use super::remaining::Remaining;
+use super::wanders::{Wanders, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
-use crate::answer::file::{RemainingRecord, VerdictKind};
-use crate::answer::records::lacking;
-use crate::openset::left::Left;
+use crate::file::{RemainingRecord, VerdictKind};
+use crate::model::hypothesis::{Effect, Hypothesis};
 use crate::openset::uneven::{Uneven, uneven};
-use crate::openset::wanders::{Wanders, wanders};
 use crate::search::explore::Explored;
-use crate::search::hypothesis::Hypothesis;
 use crate::search::leaves_more;
+use crate::search::screen::Candidate;
 
 /// What is believed.
 pub struct Judgement<'d> {
@@ -19,7 +19,7 @@ pub struct Judgement<'d> {
     /// The set that the evidence prefers, as a place in the pool; the simulation as it is where nothing is significant.
     pub winner: usize,
     /// What its residual holds.
-    pub left: Left<'d>,
+    pub rest: Remaining<'d>,
     /// The same as it is reported.
     pub remaining: Option<RemainingRecord>,
     /// The set whose effects are told: the winner, or the likeliest one where a mismatch is significant and no set outweighs its price.
@@ -51,12 +51,12 @@ impl<'d> Judgement<'d> {
         let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
         let blocks = block_scores(setting, pool);
         let winner = if significant { tie_broken(pool, &blocks) } else { 0 };
-        let left = Left::of(search, pool, winner, significant);
-        let probability = likelihoods(pool, &weighed, &blocks, winner, left.imperfect);
-        let mut support = firmness(pool, &weighed, &probability, winner, left.imperfect);
+        let rest = Remaining::of(search, pool, winner, significant);
+        let probability = likelihoods(pool, &weighed, &blocks, winner, rest.imperfect);
+        let mut support = firmness(pool, &weighed, &probability, winner, rest.imperfect);
         let best = &pool[winner];
         // Where something is left, or rivals were not heard, nothing is firm anyway, and what is missing looks like a strength that varies.
-        let uneven = if left.imperfect || unfinished() {
+        let uneven = if rest.imperfect || unfinished() {
             vec![None; best.effects.len()]
         } else {
             uneven(&best.base, setting.noise, &best.effects)
@@ -79,10 +79,10 @@ impl<'d> Judgement<'d> {
         // A mismatch that is significant stays one, though nothing that was fitted in time explains it.
         let cut_short = significant && winner == 0 && unfinished();
         let mut within = if cut_short { VerdictKind::Ambiguous } else { verdict(&support) };
-        let remaining = left.record(pool, winner);
+        let remaining = rest.record(pool, winner);
         let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
             || wandering.iter().flatten().any(|w| w.probability >= FIRM);
-        let outside = elsewhere || left.is_outside(&support, remaining.as_ref());
+        let outside = elsewhere || rest.is_outside(&support, remaining.as_ref());
         // Under a noise of its own a simulation may leave more than it has to.
         let least = least.as_ref().unwrap_or(&pool[0]);
         let veto = if winner > 0 { veto(best, least, worse_on_blocks(&blocks, winner)) } else { None };
@@ -104,7 +104,7 @@ impl<'d> Judgement<'d> {
             weighed,
             probability,
             winner,
-            left,
+            rest,
             remaining,
             told,
             support,
@@ -148,4 +148,14 @@ fn veto(best: &Hypothesis<'_>, least: &Hypothesis<'_>, worse_on_blocks: bool) ->
     } else {
         None
     }
+}
+
+/// What the recording lacks for a firm answer about each effect of the best set; `None` where nothing is lacking.
+fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String>> {
+    let told = |e: &Effect| {
+        let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?;
+        let lacking = candidate.lacking.as_ref()?;
+        Some(format!("{}: for a firm answer the recording lacks something: {lacking}", e.mechanism.id))
+    };
+    best.effects.iter().map(told).collect()
 }

@@ -7,9 +7,11 @@
 pub(crate) mod firmness;
 pub(crate) mod judgement;
 pub mod reliability;
+mod remaining;
+mod wanders;
 pub(crate) mod weigh;
 
-use crate::answer::file::VerdictKind;
+use crate::file::VerdictKind;
 
 /// The probability from which a statement is firm.
 pub const FIRM: f64 = 0.9;

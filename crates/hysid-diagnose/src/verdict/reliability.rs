@@ -10,7 +10,7 @@
 //! xtask reliability`, from statements of development seeds 51, 71, 81, 91 and 101 (`xtask/reliability/`).
 
 use super::{FIRM, NOT_FIRM};
-use crate::answer::file::{DiagnosisFile, VerdictKind};
+use crate::file::{DiagnosisFile, VerdictKind};
 
 /// From support to probability: `1 / (1 + exp(-(constant + slope logit(support) + several)))`, the last for sets of two and more.
 #[derive(Debug, Clone, Copy, PartialEq)]

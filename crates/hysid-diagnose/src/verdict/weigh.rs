@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 use super::{Claim, FIRM, Hypothesis as Weighed};
-use crate::evidence::norm2;
+use crate::budget::Step;
+use crate::evidence::{difference, norm2};
 use crate::model::base::Base;
-use crate::search::budget::Step;
+use crate::model::hypothesis::{Effect, Hypothesis, Setting, block_score};
 use crate::search::compose::best_of;
-use crate::search::hypothesis::{Effect, Hypothesis, Setting, block_score};
 
 /// Weight of the log evidence in the probabilities.
 pub const EVIDENCE_WEIGHT: f64 = 0.4;
@@ -111,31 +111,11 @@ pub fn tie_broken(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>]) -
         .unwrap_or(standing)
 }
 
-/// Mean and standard error of `a - b` over stretches of 20 rows (neighbouring errors are no independent witnesses); `None` for
-/// fewer than five stretches.
-fn difference(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
-    let differences: Vec<f64> =
-        a.chunks(20).zip(b.chunks(20)).map(|(a, b)| a.iter().sum::<f64>() - b.iter().sum::<f64>()).collect();
-    let count = differences.len() as f64;
-    let mean = differences.iter().sum::<f64>() / count.max(1.0);
-    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    (count > 4.0).then_some((mean, (variance / count).sqrt()))
-}
-
 /// Whether the winner predicts the held-out blocks worse than the simulation as it is, by more than a standard error: an effect that acts at a few
 /// moments only may leave all blocks as they are.
 pub fn worse_on_blocks(blocks: &[Option<(f64, Vec<f64>)>], winner: usize) -> bool {
     let (Some(Some((_, none))), Some(Some((_, best)))) = (blocks.first(), blocks.get(winner)) else { return false };
     difference(best, none).is_some_and(|(mean, error)| mean > error)
-}
-
-/// Probability that squared errors on blocks fall by so much by chance, one-sided; `None` where the blocks are too few.
-pub fn better_by_chance(before: &[f64], after: &[f64]) -> Option<f64> {
-    let (mean, error) = difference(before, after)?;
-    let t = mean / error.max(f64::MIN_POSITIVE);
-    let count = before.chunks(20).count() as f64;
-    let law = statrs::distribution::StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
-    Some(1.0 - statrs::distribution::ContinuousCDF::cdf(&law, t))
 }
 
 /// Whether a parameter of the effect stands at a bound: the law is stretched to what it was not made for, a sibling may be meant.
@@ -268,11 +248,11 @@ mod tests {
 
     use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
+    use crate::budget::Budget;
     use crate::data::DataSet;
     use crate::model::base::NoiseKind;
-    use crate::search::budget::Budget;
+    use crate::model::hypothesis::calibrated;
     use crate::search::fitting::refit;
-    use crate::search::hypothesis::calibrated;
     use crate::search::screen::screen;
 
     #[test]

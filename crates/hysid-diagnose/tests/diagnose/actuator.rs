@@ -1,7 +1,7 @@
 //! Whole diagnoses of an actuator whose recordings come from plays of the tests' own: the form of the law is the one that the recording asks for.
 
 use crate::oscillator::{PERIOD, drive, normal};
-use hysid_diagnose::answer::file::ParameterRecord;
+use hysid_diagnose::file::ParameterRecord;
 use hysid_diagnose::{Diagnosis, Hooks, Options, Request, diagnose};
 use hysid_plant::Simulation;
 use hysid_signal::{Channel, Clock, Recording};

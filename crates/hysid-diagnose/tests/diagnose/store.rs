@@ -1,6 +1,6 @@
 //! Whole diagnoses of a tank, whose columns end in compound units.
 
-use hysid_diagnose::answer::file::VerdictKind;
+use hysid_diagnose::file::VerdictKind;
 use hysid_signal::{Channel, Clock, Recording};
 
 use super::oscillator::normal;

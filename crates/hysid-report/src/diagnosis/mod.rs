@@ -9,8 +9,8 @@ mod figures;
 mod words;
 
 use hysid_diagnose::Interval;
-use hysid_diagnose::answer::file::{DiagnosisFile, VerdictKind};
 use hysid_diagnose::answer::picture::{ParameterPicture, Picture};
+use hysid_diagnose::file::{DiagnosisFile, VerdictKind};
 
 use crate::page::{Align, Page, Table, Tenor};
 use crate::words::{Provenance, interval, number, p_value, percent, probability};

@@ -1,6 +1,6 @@
 //! Words and numbers as people read them.
 
-use hysid_diagnose::answer::file::{DiagnosisFile, VerdictKind};
+use hysid_diagnose::file::{DiagnosisFile, VerdictKind};
 
 /// An identifier of the file format as words.
 pub(super) fn plain(identifier: &str) -> String {

@@ -7,8 +7,8 @@
 use std::collections::BTreeSet;
 
 use hysid::identify::{Columns, Decimate, Factors, FitReport, IdentifyError, Options, Source, Stop, identify_until};
-use hysid_diagnose::answer::file::DiagnosisFile;
 use hysid_diagnose::answer::picture::{Picture, RecordPicture, Role};
+use hysid_diagnose::file::DiagnosisFile;
 use hysid_narx::NarxModel;
 use hysid_plant::Simulation;
 use hysid_signal::{Channel, Clock, Recording};

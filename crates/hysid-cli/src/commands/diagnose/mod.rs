@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use anyhow::Context;
-use hysid_diagnose::answer::file::VerdictKind;
+use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 

@@ -3,12 +3,13 @@
 //! Each of these takes a good part of what a parameter does that never rests. Such a parameter is not of the catalogue: it is heard as a rival of each of
 //! these effects, around the set without that effect.
 
-use super::{noises, varying};
-use crate::answer::text::number;
+use super::weigh::EVIDENCE_WEIGHT;
 use crate::mechanism::Family;
+use crate::model::hypothesis::{Effect, Hypothesis};
+use crate::openset::noises;
+use crate::openset::varying::varying;
 use crate::search::Search;
-use crate::search::hypothesis::{Effect, Hypothesis};
-use crate::verdict::weigh::EVIDENCE_WEIGHT;
+use crate::text::number;
 
 /// A parameter that varies in the place of an effect.
 #[derive(Debug, Clone)]
@@ -60,12 +61,12 @@ mod tests {
     use hysid_plant::Simulation;
 
     use super::*;
+    use crate::budget::Budget;
     use crate::mechanism::SLOW;
     use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::calibrated;
     use crate::openset::varying::tests::{BASELINE, recorded};
     use crate::request::{Hooks, Options};
-    use crate::search::budget::Budget;
-    use crate::search::hypothesis::calibrated;
 
     /// The probability that the stiffness of an oscillator wanders, beside an abrupt change of it, where it is multiplied by this function of the time.
     fn beside_a_change(factor: impl Fn(f64) -> f64) -> f64 {

@@ -5,7 +5,7 @@
 
 use hysid_plant::Simulation;
 
-use super::budget::Budget;
+use crate::budget::Budget;
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Rewritten};

@@ -1,16 +1,16 @@
 //! What is left of the winning set's residual: whether something significant is, whether generic terms find it, and whether the set is then only
 //! an imitation of a law that the catalogue does not have.
 
-use super::needed::{Refitted, fitted};
-use super::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
-use crate::answer::file::{CorrectionRecord, RemainingRecord, finite};
+use super::firmness::is_a_spectrum;
+use super::{FIRM, Support};
+use crate::budget::Step;
 use crate::evidence::SurrogateTest;
+use crate::evidence::better_by_chance;
+use crate::file::{CorrectionRecord, RemainingRecord, finite};
+use crate::model::hypothesis::{Hypothesis, block_score};
+use crate::openset::needed::{Refitted, fitted};
+use crate::openset::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
 use crate::search::Search;
-use crate::search::budget::Step;
-use crate::search::hypothesis::{Hypothesis, block_score};
-use crate::verdict::firmness::is_a_spectrum;
-use crate::verdict::weigh::better_by_chance;
-use crate::verdict::{FIRM, Support};
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
@@ -26,7 +26,7 @@ const FAR_MORE: f64 = 5.0;
 const WORTH_A_FIT: f64 = 0.25;
 
 /// What is left of a set's residual.
-pub struct Left<'d> {
+pub struct Remaining<'d> {
     /// The surrogate test of the residual; `None` where the set is empty or there was no time.
     test: Option<SurrogateTest>,
     /// Generic terms for the residual; `None` where no mismatch is significant or no term is chosen.
@@ -48,7 +48,7 @@ pub struct Left<'d> {
     alpha: f64,
 }
 
-impl<'d> Left<'d> {
+impl<'d> Remaining<'d> {
     /// Of the `winner` of a pool whose first set is the simulation without effects.
     pub fn of(search: &Search<'_, 'd>, pool: &[Hypothesis<'d>], winner: usize, significant: bool) -> Self {
         let (best, none) = (&pool[winner], &pool[0]);
