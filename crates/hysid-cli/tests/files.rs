@@ -144,13 +144,11 @@ fn rows_with_a_constant_input() -> String {
 /// Each once ran for ever in the iteration for the poles of its linear model.
 #[test]
 fn degenerate_outputs_end() {
-    let cases: [(&str, fn(usize, f64, f64) -> f64); 2] = [
-        ("a constant but for one sample", |n, _, _| if n == 200 { 2.0 } else { 1.0 }),
-        ("far below what can be squared", |_, _, y| 1e-200 * y),
-    ];
-    for (what, change) in cases {
+    let spike = recording(400, 0.01, |n, _, _| if n == 200 { 2.0 } else { 1.0 });
+    let tiny = recording(400, 0.01, |_, _, y| 1e-200 * y);
+    for (what, text) in [("a constant but for one sample", spike), ("far below what can be squared", tiny)] {
         let dir = tempfile::tempdir().unwrap();
-        std::fs::write(dir.path().join("est.csv"), recording(400, 0.01, change)).unwrap();
+        std::fs::write(dir.path().join("est.csv"), text).unwrap();
         let mut command = Command::cargo_bin("hysid").unwrap();
         let done = command.current_dir(dir.path()).args(FIT).timeout(Duration::from_secs(200)).output().unwrap();
         let said = String::from_utf8_lossy(&done.stderr);

@@ -139,11 +139,11 @@ fn sense(file: &FileModel) -> Result<(), NarxError> {
     if !(1..=LARGEST_DECIMATION).contains(&file.decimation) {
         return bad(format!("`decimation` is {}; allowed is 1 to {LARGEST_DECIMATION}", file.decimation));
     }
-    if !(file.limit > 0.0) {
+    if file.limit.is_nan() || file.limit <= 0.0 {
         return bad(format!("`limit` is {}; a number above 0 is needed", digits(file.limit, 4)));
     }
     for (i, term) in file.terms.iter().enumerate() {
-        if let Some(error) = term.standard_error.filter(|e| !(*e >= 0.0)) {
+        if let Some(error) = term.standard_error.filter(|e| e.is_nan() || *e < 0.0) {
             return bad(format!("`terms[{i}].standard_error` is {}; it cannot be below 0", digits(error, 4)));
         }
     }

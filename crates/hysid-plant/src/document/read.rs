@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::validate::Fault;
+use super::validate::{Fault, Within};
 use super::{ClockSource, Hold, Initial, Input, Output, Parameter, Simulation, State, Time};
 use crate::error::{Error, ErrorKind, Place};
 use crate::expr::Expr;
@@ -92,7 +92,8 @@ fn expression(key: &str, value: &Value<'_>) -> Result<Expr, Fault> {
     let Some(source) = value.get_ref().as_str() else {
         return wrong_type(key, "an expression in quotes", value);
     };
-    Expr::parse(source).map_err(|e| Fault { offset: Some(e.at), ..Fault::of(key, ErrorKind::Expression(e.message)) })
+    Expr::parse(source)
+        .map_err(|e| Fault { within: Within::Byte(e.at), ..Fault::of(key, ErrorKind::Expression(e.message)) })
 }
 
 fn unit(key: &str, value: &Value<'_>) -> Result<Unit, Fault> {
@@ -256,10 +257,13 @@ impl Simulation {
             let offset = span.map(|span| {
                 let source = text.get(span.clone()).unwrap_or_default();
                 let quotes = if source.starts_with("\"\"\"") || source.starts_with("'''") { 3 } else { 1 };
-                let inside = fault.offset.or_else(|| {
-                    let inner = source.get(quotes..source.len().saturating_sub(quotes))?;
-                    crate::expr::place_of_use(inner, fault.symbol.as_deref()?, fault.number)
-                });
+                let inside = match &fault.within {
+                    Within::Value => None,
+                    Within::Byte(at) => Some(*at),
+                    Within::Use(symbol, number) => source
+                        .get(quotes..source.len().saturating_sub(quotes))
+                        .and_then(|inner| crate::expr::place_of_use(inner, symbol, *number)),
+                };
                 inside.map_or(span.start, |i| span.start + quotes + i)
             });
             Error { file, place: offset.map(|o| place(text, o)), key, kind: fault.kind }

@@ -6,16 +6,22 @@ use super::{ClockSource, Initial, Simulation};
 use crate::error::{Error, ErrorKind};
 use crate::expr::{Expr, is_identifier, is_reserved};
 
+/// A place in the value of a key.
+pub(crate) enum Within {
+    /// All of it.
+    Value,
+    /// This byte of an expression.
+    Byte(usize),
+    /// A use of a symbol or operator in an expression, the first being number 0.
+    Use(String, usize),
+}
+
 /// A fault before its place in the text is known.
 pub(crate) struct Fault {
     /// The key, `#key` appended where the key itself is at fault and not its value.
     pub key: String,
-    /// The symbol or operator at fault within an expression.
-    pub symbol: Option<String>,
-    /// Which of its uses there, from 0.
-    pub number: usize,
-    /// Byte offset within an expression.
-    pub offset: Option<usize>,
+    /// Where in the value of that key.
+    pub within: Within,
     /// What is wrong.
     pub kind: ErrorKind,
 }
@@ -23,12 +29,12 @@ pub(crate) struct Fault {
 impl Fault {
     /// A fault of the value at `key`.
     pub fn of(key: impl Into<String>, kind: ErrorKind) -> Self {
-        Self { key: key.into(), symbol: None, number: 0, offset: None, kind }
+        Self { key: key.into(), within: Within::Value, kind }
     }
 
     /// A fault at one use of a symbol or operator in the expression at `key`, the first being number 0.
     pub fn at_use(key: impl Into<String>, symbol: &str, number: usize, kind: ErrorKind) -> Self {
-        Self { symbol: Some(symbol.to_owned()), number, ..Self::of(key, kind) }
+        Self { key: key.into(), within: Within::Use(symbol.to_owned(), number), kind }
     }
 }
 
