@@ -322,7 +322,7 @@ fn requests() -> Vec<Case> {
             &COLUMN,
             &["est.csv", "`x_m`", "constant"],
         ),
-        case("one sample in column mode", recording("est.csv", first(2)), &COLUMN, &["est.csv", "samples"]),
+        case("one sample in column mode", recording("est.csv", first(2)), &COLUMN, &["est.csv", "1 sample;"]),
     ]
 }
 
