@@ -206,7 +206,7 @@ fn recordings() -> Vec<Case> {
             &["val.csv", "empty"],
         ),
         val("a hold-out of a header only", Box::new(first(1)), &["val.csv", "not one line"]),
-        est("one sample", Box::new(first(2)), &["est.csv", "samples"]),
+        est("one sample", Box::new(first(2)), &["est.csv", "1 sample;"]),
         est("fewer samples than unknowns", Box::new(first(9)), &["est.csv", "8 usable samples"]),
         val("too few samples in the hold-out", Box::new(first(9)), &["val.csv", "usable samples"]),
         est("a ragged row", Box::new(|t| t.replacen("\n0.1,", "\n0.1,7,", 1)), &["est.csv, line 6", "5 fields"]),
@@ -322,7 +322,7 @@ fn requests() -> Vec<Case> {
             &COLUMN,
             &["est.csv", "`x_m`", "constant"],
         ),
-        case("one sample in column mode", recording("est.csv", first(2)), &COLUMN, &["est.csv", "samples"]),
+        case("one sample in column mode", recording("est.csv", first(2)), &COLUMN, &["est.csv", "1 sample;"]),
     ]
 }
 

@@ -44,7 +44,7 @@ fn each_bad_recording_ends_every_command_with_one_clear_message() {
         ("empty file", Vec::new(), &["rec.csv", "empty"]),
         ("blank lines", b"\n\n\n".to_vec(), &["rec.csv", "empty"]),
         ("header only", first(1), &["rec.csv"]),
-        ("one sample", first(2), &["rec.csv", "1 samples"]),
+        ("one sample", first(2), &["rec.csv", "1 sample;"]),
         ("short row", with_line(7, "0.05,1.0"), &["rec.csv", "line 7", "2 fields", "4"]),
         ("long row", with_line(7, "0.05,1,2,3,4"), &["line 7", "5 fields"]),
         ("text", with_line(7, "0.05,abc,2,1.5"), &["line 7", "u_V", "abc"]),

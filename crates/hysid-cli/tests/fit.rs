@@ -25,6 +25,7 @@ fn recording(rows: usize) -> String {
 fn files() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("est.csv"), recording(600)).unwrap();
+    std::fs::write(dir.path().join("val.csv"), recording(500)).unwrap();
     std::fs::write(dir.path().join("short.csv"), recording(4)).unwrap();
     std::fs::write(dir.path().join("empty.csv"), "").unwrap();
     dir
@@ -37,11 +38,11 @@ fn path(dir: &Path, name: &str) -> String {
 #[test]
 fn a_fit_is_written_and_predicts_every_row() {
     let dir = files();
-    let (est, out) = (path(dir.path(), "est.csv"), path(dir.path(), "out"));
+    let (est, val, out) = (path(dir.path(), "est.csv"), path(dir.path(), "val.csv"), path(dir.path(), "out"));
     let common = ["fit", "--recording", &est, "--input", "u_V", "--output", "y_mm"];
     let fit = |out: &str, threads: &str| {
         let mut args = common.to_vec();
-        args.extend(["--holdout", &est, "--out", out, "--threads", threads, "--json"]);
+        args.extend(["--holdout", &val, "--out", out, "--threads", threads, "--json"]);
         let done = hysid(&args);
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         done.stdout
@@ -143,7 +144,7 @@ fn bad_input_ends_with_status_2_one_message_and_no_file() {
         (with(&["--terms", "0"]), "--terms is 0"),
         (with(&["--terms", "many"]), "auto"),
         (with(&["--decimate", "0"]), "--decimate is 0"),
-        (with(&["--decimate", "900"]), "samples"),
+        (with(&["--decimate", "900"]), "usable sample"),
         (with(&["--decimate", "x"]), "auto, none"),
         (with(&["--criterion", "err:2"]), "between 0 and 1"),
         (with(&["--criterion", "best"]), "press"),

@@ -137,7 +137,7 @@ fn bad_input_ends_it_with_one_message() {
     let cases: Vec<(Vec<u8>, &[&str], &[&str])> = vec![
         (Vec::new(), &[], &["r.csv", "empty"]),
         (file(String::new()), &[], &["r.csv", "not one line of numbers"]),
-        (file(row(0)), &[], &["r.csv", "1 samples"]),
+        (file(row(0)), &[], &["r.csv", "1 sample;"]),
         (file((0..3).map(row).collect()), &[], &["r.csv", "3 samples", "largest lag is 3"]),
         (file(with(9, "0.9,x,2\n")), &[], &["r.csv, line 11, column `u`", "`x` is not a number"]),
         (file(with(9, "0.9,1e200,2\n")), &[], &["r.csv, line 11, column `u`", "out of range"]),

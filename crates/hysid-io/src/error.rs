@@ -3,6 +3,11 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use hysid_signal::tell::{brief, counted, digits};
+
+/// Names of columns that a message lists at most.
+const MOST_NAMES: usize = 20;
+
 /// Bad input: which file, where in it, and what is wrong there.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub struct InputError {
@@ -23,7 +28,7 @@ impl fmt::Display for InputError {
             write!(f, ", line {line}")?;
         }
         if let Some(column) = &self.column {
-            write!(f, ", column `{column}`")?;
+            write!(f, ", column `{}`", brief(column))?;
         }
         write!(f, ": {}", self.problem)
     }
@@ -53,6 +58,12 @@ pub enum InputProblem {
     /// There is no such file.
     #[error("there is no such file")]
     NotFound,
+    /// The path is a pipe or a device, where a file is needed that can be read twice.
+    #[error("this is a pipe or a device; a recording is read more than once and must be a file")]
+    NotAFile,
+    /// The file is larger than anything of its kind.
+    #[error("the file is larger than {0} bytes, which no file of this kind is")]
+    TooLarge(u64),
     /// The path is a directory.
     #[error("this is a directory; a file is needed")]
     IsDirectory,
@@ -87,10 +98,13 @@ pub enum InputProblem {
     #[error("there is no such column; the file has {0}")]
     MissingColumn(String),
     /// No time column and no period.
-    #[error("there is no time column `t_s`, and no sampling period was given")]
-    NoClock,
+    #[error(
+        "there is no time column `t_s`, and no sampling period was given; the file has {0}: name the column of the time in seconds `t_s`, \
+         or give the period (`--period-s`, or `period_s` in [time] of a simulation)"
+    )]
+    NoClock(String),
     /// A row with too few or too many fields.
-    #[error("{found} fields where the header has {expected}")]
+    #[error("{} where the header has {expected}", counted(*found, "field"))]
     RaggedRow {
         /// Fields in this row.
         found: u64,
@@ -107,7 +121,7 @@ pub enum InputProblem {
     #[error("a time stamp is missing")]
     MissingTime,
     /// Time goes back.
-    #[error("time goes back, from {before} s to {here} s")]
+    #[error("time goes back, from {} s to {} s", stamp(*before), stamp(*here))]
     DecreasingTime {
         /// The time stamp before.
         before: f64,
@@ -115,12 +129,15 @@ pub enum InputProblem {
         here: f64,
     },
     /// The same time stamp twice.
-    #[error("the time stamp {0} s stands twice")]
+    #[error("the time stamp {} s stands twice", stamp(*.0))]
     DuplicateTime(f64),
     /// The clock is not uniform.
     #[error(
-        "the clock is not uniform: {here} s where a period of {period} s since the first sample leads to {expected} s (rows are missing, \
-         or the recording must be resampled)"
+        "the clock is not uniform: {} s where a period of {} s since the first sample leads to {} s (rows are missing, \
+         or the recording must be resampled)",
+        stamp(*here),
+        digits(*period, 4),
+        stamp(*expected)
     )]
     NonUniformClock {
         /// The time stamp found.
@@ -131,7 +148,7 @@ pub enum InputProblem {
         period: f64,
     },
     /// Too few samples for what is asked.
-    #[error("{found} samples; at least {needed} are needed")]
+    #[error("{}; at least {needed} are needed", counted(*found, "sample"))]
     TooFewSamples {
         /// Number of samples found.
         found: usize,
@@ -142,16 +159,16 @@ pub enum InputProblem {
     #[error("not one sample is there (all are missing)")]
     AllMissing,
     /// The column never changes.
-    #[error("the column is constant ({0}); nothing can be learnt from it")]
+    #[error("the column is constant ({}); nothing can be learnt from it", digits(*.0, 4))]
     Constant(f64),
     /// A period given by the caller that is no period.
     #[error("the sampling period is {0} s; it must be a finite number above zero")]
     BadPeriod(f64),
-    /// A JSON file that does not parse.
+    /// A JSON file that does not parse, with its column in the line and the key there where they are known.
     #[error("not the JSON that is needed: {0}")]
     Json(String),
     /// A model file of another kind.
-    #[error("the file holds `{found}`; `{expected}` is needed")]
+    #[error("the file holds `{}`; `{expected}` is needed", brief(found))]
     WrongFormat {
         /// The `format` found.
         found: String,
@@ -177,6 +194,21 @@ impl InputProblem {
             std::io::ErrorKind::IsADirectory => Self::IsDirectory,
             _ => Self::Io(error.to_string()),
         }
+    }
+}
+
+/// A time stamp for a message: the digits that tell it from its neighbours, without those of the arithmetic.
+fn stamp(seconds: f64) -> String {
+    digits(seconds, 10)
+}
+
+/// The names for a message, of many columns the first ones.
+pub(crate) fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let mut names = names.into_iter();
+    let shown: Vec<String> = names.by_ref().take(MOST_NAMES).map(|n| format!("`{}`", brief(n))).collect();
+    match names.count() {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
     }
 }
 

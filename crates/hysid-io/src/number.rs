@@ -5,6 +5,8 @@
 //! power of two, which is rounded once ([`quotient`]); every other number goes to the standard library. What is not plainly a number is
 //! left to [`parse`], which judges it.
 
+use hysid_signal::tell::brief;
+
 use crate::error::InputProblem;
 
 /// The largest magnitude that a sample may have: squares and products of a few samples must stay finite.
@@ -141,18 +143,10 @@ pub(crate) fn parse(field: &[u8]) -> Result<f64, InputProblem> {
     let text = std::str::from_utf8(field).map_err(|_| InputProblem::NotUtf8(""))?;
     match text.parse::<f64>() {
         Ok(value) if value.abs() <= LARGEST_VALUE || value.is_nan() => Ok(value),
-        Ok(_) => Err(InputProblem::OutOfRange(excerpt(text))),
+        Ok(_) => Err(InputProblem::OutOfRange(brief(text))),
         Err(_) if text.contains('\0') => Err(InputProblem::NotUtf8(" (zero bytes: UTF-16 or a binary file)")),
-        Err(_) => Err(InputProblem::NotANumber(excerpt(text))),
+        Err(_) => Err(InputProblem::NotANumber(brief(text))),
     }
-}
-
-fn excerpt(text: &str) -> String {
-    let mut short: String = text.chars().take(40).collect();
-    if short.len() < text.len() {
-        short.push('…');
-    }
-    short
 }
 
 /// What [`decimals`] says of a number with an exponent: it counts as exact.

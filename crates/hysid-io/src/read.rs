@@ -6,7 +6,7 @@ use hysid_signal::{Channel, Clock, Recording};
 
 use crate::chunks::CsvChunks;
 use crate::clock::fit_clock;
-use crate::error::{InputError, InputProblem};
+use crate::error::{InputError, InputProblem, listed};
 
 /// Where the sampling period comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,7 +85,7 @@ pub fn read_recording(file: &Path, options: &ReadOptions) -> Result<Recording, I
             Clock { start_s: fit.start_s, period_s: fit.period_s }
         }
         (None, TimeSource::Period(p) | TimeSource::ColumnOrPeriod(_, p)) => Clock { start_s: 0.0, period_s: *p },
-        (None, TimeSource::Column(_)) => return Err(InputError::whole(file, InputProblem::NoClock)),
+        (None, TimeSource::Column(_)) => return Err(no_clock(file, &header)),
     };
     if found < 2 {
         return Err(InputError::whole(file, InputProblem::TooFewSamples { found, needed: 2 }));
@@ -102,13 +102,17 @@ pub fn read_recording(file: &Path, options: &ReadOptions) -> Result<Recording, I
     Recording::new(name, clock, channels).map_err(|_| InputError::whole(file, InputProblem::BadPeriod(clock.period_s)))
 }
 
+fn no_clock(file: &Path, header: &[String]) -> InputError {
+    InputError::whole(file, InputProblem::NoClock(listed(header.iter().map(String::as_str))))
+}
+
 /// The time column to read, if the file has one that is wanted.
 fn time_column<'a>(file: &Path, source: &'a TimeSource, header: &[String]) -> Result<Option<&'a str>, InputError> {
     match source {
         TimeSource::Column(name) if header.contains(name) => Ok(Some(name)),
-        TimeSource::Column(name) if name == "t_s" => Err(InputError::whole(file, InputProblem::NoClock)),
+        TimeSource::Column(name) if name == "t_s" => Err(no_clock(file, header)),
         TimeSource::Column(name) => {
-            let has = header.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+            let has = listed(header.iter().map(String::as_str));
             Err(InputError::in_column(file, name, InputProblem::MissingColumn(has)))
         }
         TimeSource::ColumnOrPeriod(name, _) if header.contains(name) => Ok(Some(name)),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use hysid_signal::{Channel, Recording};
 
-use crate::error::{InputError, InputProblem};
+use crate::error::{InputError, InputProblem, listed};
 
 /// The channel of this name.
 ///
@@ -12,7 +12,7 @@ use crate::error::{InputError, InputProblem};
 /// [`InputProblem::MissingColumn`], with the names that there are.
 pub fn channel<'a>(recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
     recording.channel(name).ok_or_else(|| {
-        let has = recording.channels().iter().map(|c| format!("`{}`", c.name)).collect::<Vec<_>>().join(", ");
+        let has = listed(recording.channels().iter().map(|c| c.name.as_str()));
         InputError::in_column(Path::new(recording.name()), name, InputProblem::MissingColumn(has))
     })
 }

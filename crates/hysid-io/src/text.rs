@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
-use crate::error::{InputError, InputProblem};
+use crate::error::{InputError, InputProblem, listed};
 use crate::rows::{Fields, Layout, without_end};
 
 /// Bytes in a block of text, but for the end of its last line.
@@ -78,7 +78,7 @@ pub(crate) fn start(file: &Path, select: Option<&[&str]>) -> Result<Source, Inpu
     };
     let index_of = |name: &&str| {
         names.iter().position(|n| n == name).ok_or_else(|| {
-            let has = names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+            let has = listed(names.iter().map(String::as_str));
             InputError::in_column(file, name, InputProblem::MissingColumn(has))
         })
     };
@@ -120,6 +120,8 @@ fn header(file: &Path, text: &[u8]) -> Result<(Vec<String>, usize, u64), InputEr
             Some("semicolons")
         } else if single.contains('\t') {
             Some("tabs")
+        } else if single.contains('|') {
+            Some("bars")
         } else {
             None
         };
@@ -143,11 +145,15 @@ fn header(file: &Path, text: &[u8]) -> Result<(Vec<String>, usize, u64), InputEr
 
 fn open(file: &Path) -> Result<File, InputError> {
     let whole = |error: &std::io::Error| InputError::whole(file, InputProblem::from_io(error));
-    let input = File::open(file).map_err(|e| whole(&e))?;
-    if input.metadata().map_err(|e| whole(&e))?.is_dir() {
+    // Looked at before it is opened: a pipe that nobody writes to would never open, and a device may never end.
+    let there = std::fs::metadata(file).map_err(|e| whole(&e))?;
+    if there.is_dir() {
         return Err(InputError::whole(file, InputProblem::IsDirectory));
     }
-    Ok(input)
+    if !there.is_file() {
+        return Err(InputError::whole(file, InputProblem::NotAFile));
+    }
+    File::open(file).map_err(|e| whole(&e))
 }
 
 /// Skips the byte-order mark of UTF-8 and refuses those of UTF-16.

@@ -63,7 +63,7 @@ fn each_kind_of_bad_recording_has_its_message() {
         ("duplicate column", b"t_s,u_V,u_V\n0,1,2\n", &all, Some(1), Some("u_V"), |p| *p == P::DuplicateColumn),
         ("the same column asked for twice", b"t_s,u_V\n0,1\n", &twice, None, Some("u_V"), |p| *p == P::DuplicateColumn),
         ("missing column", b"t_s,u_V\n0,1\n", &uy, None, Some("y_mm"), |p| matches!(p, P::MissingColumn(_))),
-        ("no time column", b"u_V,y_mm\n1,2\n", &uy, None, None, |p| *p == P::NoClock),
+        ("no time column", b"u_V,y_mm\n1,2\n", &uy, None, None, |p| *p == P::NoClock("`u_V`, `y_mm`".into())),
         ("missing own time column", b"u_V,y_mm\n1,2\n", &own_clock, None, Some("time"), |p| {
             matches!(p, P::MissingColumn(_))
         }),

@@ -1,8 +1,8 @@
 //! What is written reads back as the same; a failed write leaves nothing behind.
 
 use hysid_io::{
-    CsvChunks, InputProblem, ReadOptions, TimeSource, format_number, read_recording, read_versioned, write_csv,
-    write_recording, write_versioned,
+    CsvChunks, InputProblem, ReadOptions, TimeSource, format_number, read_recording, read_text, read_versioned,
+    write_csv, write_recording, write_versioned,
 };
 use hysid_signal::{Channel, Clock, Recording};
 use proptest::prelude::*;
@@ -70,7 +70,6 @@ fn a_failed_write_leaves_nothing() {
 }
 
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct Body {
     theta: Vec<f64>,
 }
@@ -100,6 +99,72 @@ fn a_model_file_carries_its_format_and_version() {
         problem(r#"{"format":"hysid.test","format_version":1,"Theta":[]}"#).problem,
         InputProblem::Json(_)
     ));
+}
+
+#[test]
+fn what_is_wrong_in_json_is_told_with_its_place_and_key() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("m.json");
+    let told = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        let error = read_versioned::<Body>(&file, "hysid.test", 3).unwrap_err().to_string();
+        error.split_once("m.json").unwrap().1.to_owned()
+    };
+    let label = "\u{feff}{\"format\": \"hysid.test\", \"format_version\": 1,\n";
+    let of = |body: &str| told(&format!("{label}{body}}}"));
+    assert_eq!(
+        of("\"theta\": [1, \"x\"]"),
+        ", line 2: not the JSON that is needed: column 16, `theta[1]`: invalid type: string \"x\", expected a number"
+    );
+    assert!(of("\"theta\": 5").contains("line 2: not the JSON that is needed: column 10, `theta`"));
+    assert!(of("\"Theta\": []").contains("missing field `theta`"));
+    assert!(told("{\"format\": \"hysid.test\", \"format_version\": -1}").contains("expected a whole number"));
+    // A byte-order mark, and nothing wrong.
+    std::fs::write(&file, format!("{label}\"theta\": [1]}}")).unwrap();
+    assert_eq!(read_versioned::<Body>(&file, "hysid.test", 3).unwrap().1, Body { theta: vec![1.0] });
+}
+
+#[test]
+fn a_file_beyond_its_limit_is_not_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("large.toml");
+    std::fs::write(&file, "0123456789").unwrap();
+    assert_eq!(read_text(&file, 10).unwrap(), "0123456789");
+    assert_eq!(read_text(&file, 9).unwrap_err().problem, InputProblem::TooLarge(9));
+    // Far larger than memory, but for its holes.
+    std::fs::File::create(&file).unwrap().set_len(1 << 40).unwrap();
+    assert!(matches!(read_versioned::<Body>(&file, "hysid.test", 1).unwrap_err().problem, InputProblem::TooLarge(_)));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_written_to_and_not_replaced_nor_taken_for_a_recording() {
+    use std::os::unix::fs::FileTypeExt;
+    let dir = tempfile::tempdir().unwrap();
+    let pipe = dir.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let error = read_recording(&pipe, &ReadOptions::default()).unwrap_err();
+    assert_eq!(error.problem, InputProblem::NotAFile);
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::read_to_string(pipe).unwrap()
+    });
+    write_csv(&pipe, &[("y", &[1.0, 2.0])]).unwrap();
+    assert_eq!(reader.join().unwrap(), "y\n1\n2\n");
+    assert!(std::fs::metadata(&pipe).unwrap().file_type().is_fifo());
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_stays_a_link() {
+    let dir = tempfile::tempdir().unwrap();
+    let (file, link) = (dir.path().join("file.csv"), dir.path().join("link.csv"));
+    std::fs::write(&file, "before").unwrap();
+    std::os::unix::fs::symlink(&file, &link).unwrap();
+    write_csv(&link, &[("y", &[1.0])]).unwrap();
+    assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "y\n1\n");
 }
 
 /// Real time columns, rounded as their makers rounded them, each with the period that its documentation states.

@@ -1,5 +1,7 @@
 //! What can be wrong with what a model is made of or run on.
 
+use hysid_signal::tell::counted;
+
 /// Bad input to a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -20,7 +22,9 @@ pub enum NarxError {
     },
     /// Fewer samples than parameters.
     #[error(
-        "{samples} usable samples are fewer than the {parameters} parameters; give a longer recording or fewer terms"
+        "{} {} fewer than the {parameters} parameters; give a longer recording or fewer terms",
+        counted(*samples, "usable sample"),
+        if *samples == 1 { "is" } else { "are" }
     )]
     TooFewSamples {
         /// Samples that have all their lags.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hysid_dictionary::{SignalName, Signals};
 use hysid_io::{InputError, WriteError};
+use hysid_signal::tell::digits;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{Coefficient, NoiseTerm, Parts};
@@ -32,6 +33,7 @@ pub enum LoadError {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(expecting = "an object with `symbol` and `column`")]
 struct FileSignal {
     symbol: String,
     column: String,
@@ -40,7 +42,7 @@ struct FileSignal {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
-#[serde(tag = "law", rename_all = "snake_case")]
+#[serde(tag = "law", rename_all = "snake_case", expecting = "an object with `law`")]
 enum FileLaw {
     Play {
         half_width: f64,
@@ -62,6 +64,7 @@ enum FileLaw {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(expecting = "an object with `symbol`, `of` and `law`")]
 struct FileDerived {
     symbol: String,
     of: String,
@@ -72,6 +75,7 @@ struct FileDerived {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(expecting = "an object with `term` and `coefficient`")]
 struct FileTerm {
     term: String,
     coefficient: f64,
@@ -80,6 +84,7 @@ struct FileTerm {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(expecting = "an object with `term`, `residual_lag` and `coefficient`")]
 struct FileNoise {
     term: String,
     residual_lag: usize,
@@ -87,6 +92,7 @@ struct FileNoise {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(expecting = "an object with the parts of a model")]
 struct FileModel {
     output: FileSignal,
     inputs: Vec<FileSignal>,
@@ -113,9 +119,38 @@ impl NarxModel {
     /// A file that cannot be read, is of another format or a newer version, or does not describe a model.
     pub fn load(path: &Path) -> Result<Self, LoadError> {
         let (_, file): (u64, FileModel) = hysid_io::read_versioned(path, MODEL_FORMAT, MODEL_VERSION)?;
-        let model = from_file(file).and_then(NarxModel::new);
+        let model = sense(&file).and_then(|()| from_file(file)).and_then(NarxModel::new);
         model.map_err(|source| LoadError::Model { file: path.display().to_string(), source })
     }
+}
+
+/// Steps of a model in samples of the recording, at most.
+const LARGEST_DECIMATION: usize = 1_000_000;
+
+/// Refuses what no identification writes, with the key.
+fn sense(file: &FileModel) -> Result<(), NarxError> {
+    let bad = |what: String| Err(NarxError::BadFile(what));
+    if file.terms.is_empty() {
+        return bad("`terms` is empty; a model has one term at least".into());
+    }
+    if let Some(period) = file.period_s.filter(|p| !(p.is_finite() && *p > 0.0)) {
+        return bad(format!("`period_s` is {}; a number of seconds above 0 is needed", digits(period, 4)));
+    }
+    if !(1..=LARGEST_DECIMATION).contains(&file.decimation) {
+        return bad(format!("`decimation` is {}; allowed is 1 to {LARGEST_DECIMATION}", file.decimation));
+    }
+    if file.limit.is_nan() || file.limit <= 0.0 {
+        return bad(format!("`limit` is {}; a number above 0 is needed", digits(file.limit, 4)));
+    }
+    for (i, term) in file.terms.iter().enumerate() {
+        if let Some(error) = term.standard_error.filter(|e| e.is_nan() || *e < 0.0) {
+            return bad(format!("`terms[{i}].standard_error` is {}; it cannot be below 0", digits(error, 4)));
+        }
+    }
+    if let Some(i) = file.noise.iter().position(|t| t.residual_lag == 0) {
+        return bad(format!("`noise[{i}].residual_lag` is 0; it must be 1 or more"));
+    }
+    Ok(())
 }
 
 fn finite(x: f64) -> Option<f64> {

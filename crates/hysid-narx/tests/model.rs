@@ -119,10 +119,31 @@ fn a_model_survives_its_file() {
         ("\"format_version\": 1", "\"format_version\": 99", "99"),
         ("y[n-1]", "y[n]", "lag 0"),
         ("\"half_width\": 0.25", "\"half_width\": -1", "half-width"),
+        ("\"period_s\": 0.01", "\"period_s\": 0", "`period_s` is 0"),
+        ("\"period_s\": 0.01", "\"period_s\": -2.5", "`period_s` is -2.5"),
+        ("\"decimation\": 1", "\"decimation\": 0", "`decimation` is 0"),
+        ("\"decimation\": 1", "\"decimation\": 4000000000", "`decimation` is 4000000000"),
+        (
+            "\"decimation\": 1",
+            "\"decimation\": 1.5",
+            "`decimation`: invalid type: floating point `1.5`, expected a whole number",
+        ),
+        ("\"limit\": 100", "\"limit\": -100", "`limit` is -100"),
+        ("\"standard_error\": 0", "\"standard_error\": -1", "`terms[0].standard_error` is -1"),
+        ("\"residual_lag\": 2", "\"residual_lag\": 0", "`noise[0].residual_lag` is 0"),
+        ("\"terms\": [", "\"terms\": [], \"other\": [", "`terms` is empty"),
+        (
+            "\"inputs\": [",
+            "\"inputs\": [5, ",
+            "`inputs[0]`: invalid type: integer `5`, expected an object with `symbol` and `column`",
+        ),
+        ("\"law\": \"play\"", "\"law\": \"magic\"", "`derived"),
     ] {
+        assert!(text.contains(from), "{from}");
         std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
         let message = NarxModel::load(&path).unwrap_err().to_string();
         assert!(message.contains(part) && message.contains("model.json"), "{message}");
+        assert!(!message.contains("struct") && !message.contains("File"), "{message}");
     }
 }
 

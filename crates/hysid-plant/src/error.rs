@@ -2,6 +2,8 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use hysid_signal::tell::{brief, digits};
+
 /// A place in a text file; both counts start at 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
@@ -34,7 +36,7 @@ impl Display for Error {
             f.write_str(": ")?;
         }
         if !self.key.is_empty() {
-            write!(f, "`{}`: ", self.key)?;
+            write!(f, "`{}`: ", brief(&self.key))?;
         }
         write!(f, "{}", self.kind)
     }
@@ -73,7 +75,7 @@ pub enum ErrorKind {
     #[error("{0}")]
     Unit(String),
     /// A symbol that is not an input, parameter, state, `t` or `pi`.
-    #[error("unknown symbol `{symbol}`{hint}")]
+    #[error("unknown symbol `{}`{hint}", brief(symbol))]
     UnknownSymbol {
         /// What was used.
         symbol: String,
@@ -81,13 +83,13 @@ pub enum ErrorKind {
         hint: String,
     },
     /// A name that cannot be a symbol.
-    #[error("`{0}` cannot be a symbol: a symbol is a letter followed by letters, digits or `_`")]
+    #[error("`{}` cannot be a symbol: a symbol is a letter followed by letters, digits or `_`", brief(.0))]
     BadSymbol(String),
     /// A symbol that already has a meaning.
     #[error("`{0}` is reserved: it is the name of a function, of time or of pi")]
     Reserved(String),
     /// The same symbol or column twice.
-    #[error("`{name}` is already {earlier}")]
+    #[error("`{}` is already {earlier}", brief(name))]
     Duplicate {
         /// The symbol or column.
         name: String,
@@ -95,7 +97,7 @@ pub enum ErrorKind {
         earlier: String,
     },
     /// A number that is not finite, or not in the range allowed.
-    #[error("{what} is {value}; {allowed}")]
+    #[error("{what} is {}; {allowed}", digits(*value, 6))]
     BadNumber {
         /// Whose number.
         what: &'static str,
@@ -108,13 +110,13 @@ pub enum ErrorKind {
     #[error("an estimated parameter needs `min` or `max` (both are better), or `fixed = true`")]
     MissingBound,
     /// Initial values that depend on states.
-    #[error("an initial value is a number, \"free\" or an expression of parameters; this one uses the state `{0}`")]
+    #[error("an initial value is a number, \"free\" or an expression of parameters; this one uses the state `{}`", brief(.0))]
     InitialUsesState(String),
     /// Initial values that depend on each other.
     #[error("the initial values depend on each other in a cycle: {0}")]
     Cycle(String),
     /// An initial value that uses an input or time.
-    #[error("an initial value is a number, \"free\" or an expression of parameters; `{0}` changes with time")]
+    #[error("an initial value is a number, \"free\" or an expression of parameters; `{}` changes with time", brief(.0))]
     InitialNotConstant(String),
     /// An operator with memory where none can be.
     #[error("{0}")]

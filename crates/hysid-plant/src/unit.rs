@@ -6,18 +6,21 @@
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 
-/// A product of named factors with integer exponents.
+use hysid_signal::tell::brief;
+
+/// A product of named factors with exponents that are whole or halves.
 ///
 /// Text form: factors separated by spaces, `*` or `.`; at most one `/`, after which every factor divides (parentheses around
-/// them are allowed); `^` before an exponent; `-` or `1` or nothing is dimensionless.
+/// them are allowed); `^` before an exponent (`cm^2.5/s`); `-` or `1` or nothing is dimensionless.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Unit {
+    /// Names with their exponents in halves.
     factors: Vec<(String, i32)>,
 }
 
 /// Why a text is not a unit.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is not a unit: {reason}; units look like `N s/m`, `1/s^2`, `deg` or `-`")]
+#[error("`{}` is not a unit: {reason}; units look like `N s/m`, `1/s^2`, `deg` or `-`", brief(text))]
 pub struct UnitError {
     /// What was given.
     pub text: String,
@@ -25,7 +28,7 @@ pub struct UnitError {
     pub reason: &'static str,
 }
 
-/// The base dimensions, as exponents by name.
+/// The base dimensions, as exponents by name, in halves where they are those of a [`Unit`].
 type Dimension = BTreeMap<&'static str, i32>;
 
 /// Known names: exponents of (m, kg, s, A, K).
@@ -111,32 +114,36 @@ impl Unit {
             if half.is_empty() {
                 return Err(fail("a factor is missing beside the `/`"));
             }
-            for factor in half.split([' ', '*', '.', '·']).filter(|f| !f.is_empty()) {
+            for factor in factors(half) {
                 if factor == "1" {
                     continue;
                 }
                 let (name, exponent) = match factor.split_once('^') {
-                    None => (factor, 1),
+                    None => (factor, 1.0),
                     Some((name, exponent)) => {
-                        (name, exponent.parse::<i32>().map_err(|_| fail("an exponent is not an integer"))?)
+                        (name, exponent.parse::<f64>().map_err(|_| fail("an exponent is not a number"))?)
                     }
                 };
-                if !(1..=12).contains(&exponent.unsigned_abs()) {
+                let halves = 2.0 * exponent;
+                if !(exponent != 0.0 && exponent.abs() <= 12.0) {
                     return Err(fail("an exponent is 0 or larger than 12"));
+                }
+                if halves.fract() != 0.0 {
+                    return Err(fail("only whole exponents and halves such as 0.5 or 2.5 are read"));
                 }
                 if name.is_empty() || !name.chars().all(|c| c.is_alphabetic() || matches!(c, '%' | '_' | '°')) {
                     return Err(fail("a factor is not a name"));
                 }
-                unit.multiply(name, sign * exponent);
+                unit.multiply(name, sign * halves as i32);
             }
         }
         Ok(unit)
     }
 
-    fn multiply(&mut self, name: &str, exponent: i32) {
+    fn multiply(&mut self, name: &str, halves: i32) {
         match self.factors.iter_mut().find(|(n, _)| n == name) {
-            Some((_, e)) => *e = e.saturating_add(exponent),
-            None => self.factors.push((name.to_owned(), exponent)),
+            Some((_, e)) => *e = e.saturating_add(halves),
+            None => self.factors.push((name.to_owned(), halves)),
         }
         self.factors.retain(|(_, e)| *e != 0);
     }
@@ -161,10 +168,11 @@ impl Unit {
         Self { factors }
     }
 
-    /// The square root, where every exponent is even.
+    /// The square root, where every exponent is even; elsewhere it is left open, so that a coefficient before a root whose unit was not
+    /// thought out clashes with nothing.
     pub fn root(&self) -> Option<Self> {
-        let halves = self.factors.iter().map(|(n, e)| (e % 2 == 0).then(|| (n.clone(), e / 2)));
-        Some(Self { factors: halves.collect::<Option<_>>()? })
+        let roots = self.factors.iter().map(|(n, e)| (e % 4 == 0).then(|| (n.clone(), e / 2)));
+        Some(Self { factors: roots.collect::<Option<_>>()? })
     }
 
     /// Whether no named factor is left.
@@ -209,9 +217,9 @@ impl Display for Unit {
         }
         let side = |positive: bool| {
             let chosen = self.factors.iter().filter(|(_, e)| (*e > 0) == positive);
-            let text = chosen.map(|(name, e)| match e.unsigned_abs() {
-                1 => name.clone(),
-                e => format!("{name}^{e}"),
+            let text = chosen.map(|(name, halves)| match halves.unsigned_abs() {
+                2 => name.clone(),
+                halves => format!("{name}^{}", f64::from(halves) / 2.0),
             });
             text.collect::<Vec<_>>()
         };
@@ -239,11 +247,31 @@ impl Unit {
             _ => None,
         };
         if let (Some((time, power)), Some((name, exponent))) = (per, before.last().and_then(|n| powered(n))) {
-            return Some(Self { factors: vec![(name.to_owned(), exponent), (time.to_owned(), -power)] });
+            return Some(Self { factors: vec![(name.to_owned(), 2 * exponent), (time.to_owned(), -2 * power)] });
         }
         // `x_m2` is more likely the place of a second mass than an area.
-        exponents(last).map(|_| Self { factors: vec![(last.to_owned(), 1)] })
+        exponents(last).map(|_| Self { factors: vec![(last.to_owned(), 2)] })
     }
+}
+
+/// The factors of a product; a point between two digits belongs to an exponent.
+fn factors(product: &str) -> Vec<&str> {
+    let bytes = product.as_bytes();
+    let digit = |at: Option<usize>| at.and_then(|i| bytes.get(i)).is_some_and(u8::is_ascii_digit);
+    let parts = |(at, c): (usize, char)| match c {
+        ' ' | '*' | '·' => true,
+        '.' => !(digit(at.checked_sub(1)) && digit(Some(at + 1))),
+        _ => false,
+    };
+    let mut out = Vec::new();
+    let mut from = 0;
+    for (at, c) in product.char_indices().filter(|found| parts(*found)) {
+        out.push(&product[from..at]);
+        from = at + c.len_utf8();
+    }
+    out.push(&product[from..]);
+    out.retain(|f| !f.is_empty());
+    out
 }
 
 /// A known name with the power that may follow it: `m3` is a cubic metre.

@@ -43,6 +43,7 @@ fn every_kind_of_bad_file_is_told() {
         ("min = 0.5, max = 8.0", "min = 8.0, max = 0.5", "10:26", &["lower bound", "below the upper bound"]),
         (", min = 0.5, max = 8.0", "", "10:5", &["`parameters.m`", "needs `min` or `max`", "fixed"]),
         ("unit = \"kg\"", "unit = \"kg//m\"", "10:", &["not a unit", "N s/m"]),
+        ("unit = \"kg\"", "unit = \"kg^0.3\"", "10:", &["not a unit", "whole exponents and halves"]),
         ("unit = \"kg\"", "fixed = \"yes\"", "10:", &["true or false"]),
         ("m = { value = 2.0, min = 0.5, max = 8.0, unit = \"kg\" }", "m = 2.0", "10:5", &["a table is expected"]),
         ("derivative = \"v\", ", "", "15:5", &["`derivative` is missing"]),
@@ -70,6 +71,15 @@ fn every_kind_of_bad_file_is_told() {
         (v, "u*delay(u, m)", "16:", &["units clash", "seconds"]),
         (v, "play(x, v)", "16:", &["half-width", "parameters"]),
         (v, "u*d(x)", "16:", &["`d(w)`", "input"]),
+        (v, "u - k*play(x, -0.1)/m", "16:27", &["half-width of `play` is -0.1", "not be below 0"]),
+        (v, "play(x, k) + play(x, 1 - 2*pi)", "16:34", &["half-width of `play` is -5.283"]),
+        (v, "u - play(u, sqrt(-1))", "16:25", &["half-width of `play` is NaN", "finite"]),
+        (v, "u + relay(x, 0.2, min(0.1, 3))", "16:25", &["lower threshold of `relay` is 0.2", "upper one, 0.1"]),
+        (v, "u + relay(x, 0.2, 1/0)", "16:25", &["threshold of `relay` is inf", "finite"]),
+        (v, "u + delay(u, -0.1)", "16:25", &["delay of `delay` is -0.1"]),
+        (v, "u + delay(u, 0/0)", "16:25", &["delay of `delay` is NaN"]),
+        (v, "lag(lag(u, 0.1), -0.1)", "16:21", &["time constant of `lag` is -0.1"]),
+        (v, "lag(lag(u, -0.1), 0.1)", "16:25", &["time constant of `lag` is -0.1"]),
         ("initial = 0.0, unit = \"m\" }", "initial = \"x\" }", "15:", &["cycle", "x -> x"]),
         ("initial = 0.0, unit = \"m\" }", "initial = \"v\" }", "15:", &["expression of parameters", "state `v`"]),
         ("initial = 0.0, unit = \"m\" }", "initial = \"u\" }", "15:", &["changes with time"]),
@@ -97,6 +107,41 @@ fn every_kind_of_bad_file_is_told() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn numbers_at_the_edge_and_parameters_are_left_to_operators_with_memory() {
+    for good in [
+        "lag(u, 0)",
+        "delay(u, 0)",
+        "play(u, 0)",
+        "relay(u, 0.1, 0.1)",
+        "lag(u, 0.1 - m)",
+        "relay(x, k, -k)",
+        "play(u, abs(-0.1))",
+    ] {
+        // Without units, which would not fit.
+        let text = edited("(u - c*v - k*x)/m", good);
+        let text = ["kg", "N s/m", "N/m", "m", "m/s"]
+            .iter()
+            .fold(text, |t, unit| t.replace(&format!(", unit = \"{unit}\""), ""));
+        Simulation::parse(&text, "good").unwrap_or_else(|e| panic!("{good}: {e}"));
+    }
+}
+
+#[test]
+fn long_names_are_cut_and_line_ends_escaped() {
+    let long = "x".repeat(5000);
+    for (from, to) in [
+        ("unit = \"kg\"", format!("unit = \"{long}^3.3\"")),
+        ("title", long.clone()),
+        ("(u - c*v - k*x)/m", long.clone()),
+        ("u = \"force_N\"", format!("\"a\\n{long}\" = \"force_N\"")),
+    ] {
+        let message = Simulation::parse(&edited(from, &to), "long").expect_err("it is bad").to_string();
+        assert!(message.contains('…') && message.chars().count() < 400, "{message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
 }
 
 #[test]

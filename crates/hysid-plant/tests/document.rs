@@ -78,7 +78,7 @@ fn simplification_removes_what_has_no_effect() {
 
 #[test]
 fn units_multiply_and_compare() {
-    let unit = |text| Unit::parse(text).unwrap_or_else(|e| panic!("{e}"));
+    let unit = |text: &str| Unit::parse(text).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(unit("N s/m").times(&unit("m/s")).to_string(), "N");
     assert_eq!(unit("N").per(&unit("m^3")).to_string(), "N/m^3");
     assert!(unit("N").same_dimension(&unit("kg m/s^2")));
@@ -94,7 +94,17 @@ fn units_multiply_and_compare() {
     assert_eq!(Unit::of_column("rest_min").map(|u| u.to_string()).as_deref(), Some("min"));
     assert_eq!(Unit::of_column("x_m2"), None);
     assert_eq!(Unit::of_column("valve"), None);
-    for bad in ["N/m/s", "N^x", "3 m", "/", "m^99"] {
+    // A flow through a hole goes with the root of the level.
+    for torricelli in ["cm^0.5/s", "cm^2.5/s", "1/m^1.5", "N.m^2.5"] {
+        let twice = unit(torricelli).power(2);
+        assert!(unit(&unit(torricelli).to_string()) == unit(torricelli), "{torricelli}");
+        assert!(twice.per(&unit(torricelli)).same_dimension(&unit(torricelli)), "{torricelli}");
+    }
+    assert_eq!(unit("cm^2.5/s").to_string(), "cm^2.5/s");
+    assert!(unit("cm^0.5/s").power(2).same_dimension(&unit("m/s^2")));
+    assert_eq!(unit("m^2").root(), Some(unit("m")));
+    assert_eq!(unit("m").root(), None);
+    for bad in ["m^0.3", "m^nan", "m^0.", "m^13", "m^0", "N/m/s", "N^x", "3 m", "/", "m^99"] {
         assert!(Unit::parse(bad).is_err(), "{bad}");
     }
 }

@@ -31,6 +31,24 @@ fn a_step_response_follows_its_closed_form_with_a_held_input() {
 }
 
 #[test]
+fn an_output_that_is_not_finite_is_told_and_not_a_state() {
+    let compiled = model(
+        "linear",
+        &[],
+        &[("x", "1", "0.0"), ("z", "0", "5.0")],
+        &[("fine", "z"), ("root", "sqrt(0.5 - x) + 0*u")],
+    );
+    let drive = drive(100, |_| 0.0);
+    let response = simulate(&compiled, &drive, 1);
+    assert_eq!(response.diverged_output, Some(1));
+    let why = compiled.explain_divergence(&compiled.theta(), &[0.0, 5.0], &[0.0], &response);
+    assert!(why.contains("output `root` is not finite") && !why.contains('z'), "{why}");
+    let explodes = model("linear", &[], &[("x", "50 + 50*x^3", "0.0")], &[("y", "x + u")]);
+    let response = simulate(&explodes, &drive, 1);
+    assert!(response.diverged.is_some() && response.diverged_output.is_none());
+}
+
+#[test]
 fn a_ramp_between_samples_is_a_ramp() {
     // The integral of a linear input is exact for linear interpolation.
     let compiled = model("linear", &[], &[("x", "u", "0.0")], &[("y", "x")]);

@@ -7,6 +7,7 @@ mod excitation;
 mod noise;
 mod recording;
 mod spectrum;
+pub mod tell;
 mod turning_points;
 
 pub use excitation::{Excitation, ExcitationError, modulate};

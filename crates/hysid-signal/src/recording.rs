@@ -103,15 +103,6 @@ impl Recording {
         self.clock
     }
 
-    /// Whether another recording holds the same samples under the same names, missing ones included.
-    pub fn same_samples(&self, other: &Self) -> bool {
-        let same = |a: &Channel, b: &Channel| {
-            a.name == b.name && a.samples.iter().map(|x| x.to_bits()).eq(b.samples.iter().map(|x| x.to_bits()))
-        };
-        self.channels.len() == other.channels.len()
-            && self.channels.iter().zip(&other.channels).all(|(a, b)| same(a, b))
-    }
-
     /// Number of samples in each channel.
     pub fn len(&self) -> usize {
         self.channels.first().map_or(0, |c| c.samples.len())
@@ -168,6 +159,17 @@ impl Recording {
         segments
     }
 
+    /// Whether both hold the same channels with the same samples to the bit, missing ones included.
+    pub fn same_samples(&self, other: &Self) -> bool {
+        let same = |a: &Channel, b: &Channel| {
+            a.name == b.name
+                && a.samples.len() == b.samples.len()
+                && a.samples.iter().zip(&b.samples).all(|(x, y)| x.to_bits() == y.to_bits())
+        };
+        self.channels.len() == other.channels.len()
+            && self.channels.iter().zip(&other.channels).all(|(a, b)| same(a, b))
+    }
+
     /// The samples `range` of every channel as a recording of its own; the clock starts where the range does.
     pub fn slice(&self, range: Segment) -> Self {
         let range = range.start.min(self.len())..range.end.min(self.len());
@@ -199,6 +201,17 @@ mod tests {
         assert_eq!(r.segments(&["u_V", "y_mm"]), vec![0..1, 2..3, 4..5]);
         assert_eq!(r.segments(&["u_V"]), vec![0..1, 2..5]);
         assert!(r.segments(&["missing"]).is_empty());
+    }
+
+    #[test]
+    fn the_same_samples_are_known_again() {
+        let nan = f64::NAN;
+        let r = recording(vec![1.0, nan], vec![2.0, 3.0]).unwrap();
+        assert!(r.same_samples(&r.clone()));
+        assert!(!r.same_samples(&recording(vec![1.0, nan], vec![2.0, 3.1]).unwrap()));
+        assert!(!r.same_samples(&recording(vec![1.0], vec![2.0]).unwrap()));
+        let renamed = vec![Channel { name: "x_V".into(), ..r.channels()[0].clone() }, r.channels()[1].clone()];
+        assert!(!r.same_samples(&Recording::new("r", r.clock(), renamed).unwrap()));
     }
 
     #[test]

@@ -7,6 +7,7 @@ use hysid_decimate::{Decimator, FactorRow, Phase, Recommendation, examine, recom
 use hysid_io::{ReadOptions, TimeSource, read_recording, require, write_recording};
 use serde_json::{Value, json};
 
+use super::files::keep_inputs;
 use crate::failure::Failure;
 
 /// The table of sampling-rate reductions of a recording, and which factor to take.
@@ -72,6 +73,9 @@ enum Kept {
 pub fn run(args: &Args) -> Result<(), Failure> {
     if !(args.alpha > 0.0 && args.alpha < 1.0) {
         return Err(Failure::BadInput(format!("--alpha is {}; it must lie between 0 and 1", args.alpha)));
+    }
+    if let Some(out) = &args.out {
+        keep_inputs(out, &[], [&args.recording])?;
     }
     let decimator = match args.method {
         Method::Plain => Decimator::Plain,

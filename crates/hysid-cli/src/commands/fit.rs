@@ -3,11 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use hysid::identify::{Criterion, Decimate, Factors, FitReport, Options, Source, identify};
+use hysid::identify::{Criterion, Decimate, Factors, FitReport, IdentifyError, Options, Source, identify};
 use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require, write_text};
 use hysid_signal::Recording;
+use hysid_signal::tell::brief;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::files::{keep_inputs, no_file_twice, no_samples_twice};
+use super::threads::pool;
 use crate::failure::Failure;
 
 /// Identify a model from recordings.
@@ -106,6 +109,11 @@ fn criterion(text: &str) -> Result<Criterion, String> {
 /// The clock's column where the file has it; without one, samples are counted in seconds.
 pub(crate) const TIME: &str = "t_s";
 
+/// The files that go into the folder.
+const MODEL: &str = "model.json";
+const SUMMARY: &str = "fit.json";
+const PAGE: &str = "report.html";
+
 /// Samples without which no recording can teach even a linear model and hold some back to judge it.
 const FEWEST_SAMPLES: usize = 20;
 
@@ -138,15 +146,26 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(problem) = options.problem() {
         return Err(Failure::BadInput(problem));
     }
+    let pool = pool(args.threads)?;
+    keep_inputs(&args.out, &[MODEL, SUMMARY, PAGE], args.recordings.iter().chain(&args.holdouts))?;
+    no_file_twice(&args.recordings, &args.holdouts)?;
     let mut columns: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
     columns.push(&args.output);
     for (i, c) in columns.iter().enumerate() {
+        let option = if i < args.inputs.len() { "--input" } else { "--output" };
         if columns[..i].contains(c) {
-            return Err(Failure::BadInput(format!("column `{c}` is given twice")));
+            return Err(Failure::BadInput(format!(
+                "{option} {}: this column is given twice; every --input and --output must be a different one",
+                brief(c)
+            )));
+        }
+        if *c == TIME {
+            return Err(Failure::BadInput(format!("{option} {TIME}: this is the time column, not a signal")));
         }
     }
     let read_all = |paths: &[PathBuf]| paths.iter().map(|p| read(p, &columns)).collect::<Result<Vec<_>, _>>();
     let (estimation, holdout) = (read_all(&args.recordings)?, read_all(&args.holdouts)?);
+    no_samples_twice((&args.recordings, &estimation), (&args.holdouts, &holdout))?;
     for recording in estimation.iter().chain(&holdout) {
         require::varying(recording, &args.output).map_err(Failure::bad_input)?;
     }
@@ -156,27 +175,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.out.exists() && !args.out.is_dir() {
         return Err(Failure::BadInput(format!("{}: it is there and is not a folder", args.out.display())));
     }
-    if args.threads == Some(0) {
-        return Err(Failure::BadInput("--threads is 0; it must be 1 or more".into()));
-    }
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.unwrap_or(0))
-        .build()
-        .map_err(|e| Failure::Internal(e.into()))?;
     let bar = progress();
     let source = Source { recordings: &estimation, inputs: &args.inputs, output: &args.output };
     let found = pool.install(|| identify(source, &options, &|what| bar.set_message(what.to_string())));
     bar.finish_and_clear();
-    let mut found = found.map_err(Failure::bad_input)?;
+    let mut found = found.map_err(|e| told(&args.recordings, &e))?;
     if !has_clock(&args.recordings[0])? {
         found.model = found.model.without_clock();
     }
-    let report = FitReport::new(&found, &estimation, &holdout, args.seed).map_err(Failure::bad_input)?;
+    let report = FitReport::new(&found, &estimation, &holdout, args.seed).map_err(|e| told(&args.recordings, &e))?;
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::BadInput(format!("{}: {e}", args.out.display())))?;
-    found.model.save(&args.out.join("model.json")).map_err(Failure::bad_input)?;
-    hysid_io::write_json(&args.out.join("fit.json"), &report.summary).map_err(Failure::bad_input)?;
+    found.model.save(&args.out.join(MODEL)).map_err(Failure::bad_input)?;
+    hysid_io::write_json(&args.out.join(SUMMARY), &report.summary).map_err(Failure::bad_input)?;
     let html = hysid_report::fit::page(&report, &crate::provenance());
-    write_text(&args.out.join("report.html"), &html).map_err(Failure::bad_input)?;
+    write_text(&args.out.join(PAGE), &html).map_err(Failure::bad_input)?;
     if args.json {
         let text = serde_json::to_string_pretty(&report.summary).map_err(|e| Failure::Internal(e.into()))?;
         println!("{text}");
@@ -187,6 +199,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         eprintln!("warning: {warning}");
     }
     Ok(())
+}
+
+/// What an identification says is wrong, with the recordings that it is wrong in; options were judged before.
+fn told(recordings: &[PathBuf], error: &IdentifyError) -> Failure {
+    if matches!(error, IdentifyError::MissingColumn { .. }) {
+        return Failure::bad_input(error);
+    }
+    let names: Vec<String> = recordings.iter().map(|p| p.display().to_string()).collect();
+    Failure::BadInput(format!("{}: {error}", names.join(", ")))
 }
 
 /// A spinner on standard error that shows itself after a second.

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use hysid::identify::Columns;
 use hysid_narx::NarxModel;
+use hysid_signal::tell::digits;
 
-use super::fit::{has_clock, read};
+use super::files::keep_inputs;
+use super::fit::{TIME, has_clock, read};
 use crate::failure::Failure;
 
 /// Predict a recording's output with a model.
@@ -31,6 +33,9 @@ enum Mode {
     Steps(usize),
 }
 
+/// Relative difference from the model's sampling period up to which a recording has the same.
+const SAME_RATE: f64 = 1e-4;
+
 /// The longest horizon that may be asked for.
 const LONGEST: usize = 1_000_000;
 
@@ -47,11 +52,16 @@ fn mode(text: &str) -> Result<Mode, String> {
 
 /// Reads, predicts, writes.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    keep_inputs(&args.out, &[], [&args.model, &args.recording])?;
     let model = NarxModel::load(&args.model).map_err(Failure::bad_input)?;
     let output = model.signals().output().column.clone();
     let mut columns = model.input_columns();
     columns.push(&output);
     let recording = read(&args.recording, &columns)?;
+    let clock = has_clock(&args.recording)?;
+    if let Some(made) = model.parts().period_s.filter(|_| clock) {
+        same_rate(args, made, recording.clock().period_s)?;
+    }
     let found = Columns::of(&model, &recording).map_err(Failure::bad_input)?;
     let prediction = match args.mode {
         Mode::FreeRun => model.free_run(&found.record()),
@@ -60,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     .map_err(Failure::bad_input)?;
     let t: Vec<f64> = (0..recording.len()).map(|n| recording.clock().time(n)).collect();
     let mut table: Vec<(&str, &[f64])> = Vec::new();
-    if has_clock(&args.recording)? {
+    if clock {
         table.push(("t_s", &t));
     }
     table.push((&output, &prediction.y));
@@ -69,4 +79,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         eprintln!("warning: the run diverged at sample {n}; NaN from there on");
     }
     Ok(())
+}
+
+/// Refuses a recording at another rate than those that the model was made from: its terms count samples, not seconds.
+fn same_rate(args: &Args, made: f64, found: f64) -> Result<(), Failure> {
+    if (found - made).abs() <= SAME_RATE * made {
+        return Ok(());
+    }
+    Err(Failure::BadInput(format!(
+        "{}, column `{TIME}`: the sampling period is {} s, but {} was made from recordings with one of {} s; resample the recording, or make a model from recordings at its rate",
+        args.recording.display(),
+        digits(found, 6),
+        args.model.display(),
+        digits(made, 6)
+    )))
 }

@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 
 use super::bench::{cpu_seconds, load_average, status};
 use super::fit::{AutoOr, TIME, terms};
+use super::threads::pool;
 use crate::failure::Failure;
 
 /// Select the terms of a polynomial model from a recording of any size.
@@ -89,9 +90,7 @@ fn criterion(text: &str) -> Result<Criterion, String> {
 /// # Errors
 /// Bad options, or the first thing wrong in the file.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    if args.threads == Some(0) {
-        return Err(Failure::BadInput("--threads is 0; it must be 1 or more".into()));
-    }
+    let pool = pool(args.threads)?;
     if args.input_delay > 1 {
         return Err(Failure::BadInput(format!("--input-delay is {}; it must be 0 or 1", args.input_delay)));
     }
@@ -108,10 +107,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         None => args.criterion.clone().unwrap_or(Criterion::SearchedPress),
     };
     let options = Options { search, criterion, ..Options::default() };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.unwrap_or(0))
-        .build()
-        .map_err(|e| Failure::Internal(e.into()))?;
     let header = CsvChunks::open(&args.recording, None, 1).map_err(Failure::bad_input)?.header().to_vec();
     let time = header.iter().any(|h| h == TIME && *h != args.output && !args.inputs.contains(h)).then_some(TIME);
     let (began, cpu_began) = (Instant::now(), cpu_seconds());

@@ -9,6 +9,7 @@ use hysid_io::{ReadOptions, TimeSource};
 use hysid_plant::{ClockSource, Compiled, Data, Drive, Run, Simulation, Start};
 use hysid_signal::Recording;
 
+use super::files::{keep_inputs, same_clock};
 use crate::failure::Failure;
 
 /// Run a simulation file on a recording's inputs.
@@ -33,6 +34,7 @@ const STEP_TOLERANCE: f64 = 1e-5;
 /// # Errors
 /// A simulation or recording that cannot be used; a simulation that is not finite.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    keep_inputs(&args.out, &[], [&args.simulation, &args.input])?;
     let (simulation, name) = super::simulation_file::read(&args.simulation)?;
     let compiled = Compiled::new(&simulation).map_err(|e| Failure::BadInput(format!("{name}: {e}")))?;
     let (recording, measured) = read(&args.input, &simulation)?;
@@ -56,7 +58,10 @@ enum Measured {
 fn read(path: &Path, simulation: &Simulation) -> Result<(Recording, Measured), Failure> {
     let time = match &simulation.time.clock {
         ClockSource::Column(column) => TimeSource::Column(column.clone()),
-        ClockSource::Period(period_s) => TimeSource::Period(*period_s),
+        ClockSource::Period(period_s) => {
+            same_clock(path, *period_s)?;
+            TimeSource::Period(*period_s)
+        }
     };
     let mut columns: Vec<String> = Vec::new();
     for input in &simulation.inputs {

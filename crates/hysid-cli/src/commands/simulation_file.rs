@@ -1,9 +1,9 @@
 //! The simulation file that a command was given, or one message that says what is wrong with it and where; and why it explodes.
 
-use std::io::ErrorKind;
 use std::path::Path;
 
-use hysid_plant::{Compiled, Data, Drive, Response, Run, Simulation, Start};
+use hysid_io::InputProblem;
+use hysid_plant::{Compiled, Data, Drive, LARGEST_FILE, Response, Run, Simulation, Start};
 use hysid_signal::Recording;
 
 use crate::failure::Failure;
@@ -14,15 +14,12 @@ use crate::failure::Failure;
 /// A file that cannot be read, is no text, or is no simulation.
 pub fn read(path: &Path) -> Result<(Simulation, String), Failure> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|e| {
-        let problem = match e.kind() {
-            ErrorKind::NotFound => "there is no such file".to_owned(),
-            ErrorKind::IsADirectory => "this is a directory; a simulation file (`NAME.sim.toml`) is needed".to_owned(),
-            ErrorKind::PermissionDenied => "permission denied".to_owned(),
-            ErrorKind::InvalidData => "the text is not UTF-8".to_owned(),
-            _ => format!("cannot be read: {e}"),
-        };
-        Failure::BadInput(format!("{name}: {problem}"))
+    let text = hysid_io::read_text(path, LARGEST_FILE as u64).map_err(|error| {
+        if error.problem == InputProblem::IsDirectory {
+            let problem = "this is a directory; a simulation file (`NAME.sim.toml`) is needed";
+            return Failure::BadInput(format!("{name}: {problem}"));
+        }
+        Failure::bad_input(error)
     })?;
     let simulation = Simulation::parse(&text, &name).map_err(Failure::bad_input)?;
     Ok((simulation, name))

@@ -1,5 +1,7 @@
 //! The free initial state of one recording from its first samples, and what to say where a simulation is not finite.
 
+use hysid_signal::tell::digits;
+
 use super::{Data, Settings};
 use crate::engine::{Compiled, Response};
 
@@ -42,15 +44,18 @@ impl Compiled {
         if let Some((output, value)) = simulation.outputs.iter().zip(&point.outputs).find(|(_, y)| !y.is_finite()) {
             return format!("output `{}` is {value} at the first sample", output.column);
         }
+        if let Some(output) = response.diverged_output.and_then(|j| simulation.outputs.get(j)) {
+            return format!("output `{}` is not finite at sample {at}, though all states are", output.column);
+        }
         let last = at.saturating_sub(1);
         let size = |i: usize| response.states.get(i).and_then(|s| s.get(last)).map_or(0.0, |x| x.abs());
         let largest = (0..simulation.states.len()).max_by(|a, b| size(*a).total_cmp(&size(*b)));
         match largest.and_then(|i| simulation.states.get(i).map(|s| (i, s))) {
             Some((i, state)) => {
                 format!(
-                    "state `{}` explodes: it is {:e} at sample {last} and not finite at sample {at}",
+                    "state `{}` explodes: it is {} at sample {last} and not finite at sample {at}",
                     state.name,
-                    size(i)
+                    digits(size(i), 4)
                 )
             }
             None => format!("an output is not finite at sample {at}"),

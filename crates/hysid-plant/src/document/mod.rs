@@ -2,12 +2,15 @@
 //!
 //! Whoever edits a [`Simulation`] calls [`Simulation::validate`] before use; [`crate::Compiled::new`] does so too.
 
+mod memory;
 mod read;
 mod validate;
 mod write;
 
 use crate::expr::Expr;
 use crate::unit::Unit;
+
+pub use read::LARGEST_FILE;
 
 /// An ordinary differential equation or static relation, with its parameters.
 #[derive(Debug, Clone, PartialEq)]

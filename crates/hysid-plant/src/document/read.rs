@@ -6,14 +6,14 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::validate::Fault;
+use super::validate::{Fault, Within};
 use super::{ClockSource, Hold, Initial, Input, Output, Parameter, Simulation, State, Time};
 use crate::error::{Error, ErrorKind, Place};
 use crate::expr::Expr;
 use crate::unit::Unit;
 
-/// Largest file that is read.
-const MAX_BYTES: usize = 1 << 20;
+/// Bytes of the largest simulation file that is read.
+pub const LARGEST_FILE: usize = 1 << 20;
 
 type Value<'a> = Spanned<DeValue<'a>>;
 
@@ -23,7 +23,7 @@ struct Reader {
 }
 
 fn fault<T>(key: &str, kind: ErrorKind) -> Result<T, Fault> {
-    Err(Fault { key: key.to_owned(), symbol: None, offset: None, kind })
+    Err(Fault::of(key, kind))
 }
 
 fn wrong_type<T>(key: &str, expected: &'static str, found: &Value<'_>) -> Result<T, Fault> {
@@ -92,12 +92,8 @@ fn expression(key: &str, value: &Value<'_>) -> Result<Expr, Fault> {
     let Some(source) = value.get_ref().as_str() else {
         return wrong_type(key, "an expression in quotes", value);
     };
-    Expr::parse(source).map_err(|e| Fault {
-        key: key.to_owned(),
-        symbol: None,
-        offset: Some(e.at),
-        kind: ErrorKind::Expression(e.message),
-    })
+    Expr::parse(source)
+        .map_err(|e| Fault { within: Within::Byte(e.at), ..Fault::of(key, ErrorKind::Expression(e.message)) })
 }
 
 fn unit(key: &str, value: &Value<'_>) -> Result<Unit, Fault> {
@@ -242,8 +238,8 @@ impl Simulation {
     /// The first thing that is wrong: TOML syntax, an unknown or missing key, or anything that [`Simulation::validate`] finds.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Error> {
         let file = Some(file_name.to_owned());
-        if text.len() > MAX_BYTES {
-            let kind = ErrorKind::Toml(format!("the file is larger than {MAX_BYTES} bytes"));
+        if text.len() > LARGEST_FILE {
+            let kind = ErrorKind::Toml(format!("the file is larger than {LARGEST_FILE} bytes"));
             return Err(Error { file, place: None, key: String::new(), kind });
         }
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -261,10 +257,13 @@ impl Simulation {
             let offset = span.map(|span| {
                 let source = text.get(span.clone()).unwrap_or_default();
                 let quotes = if source.starts_with("\"\"\"") || source.starts_with("'''") { 3 } else { 1 };
-                let inside = fault.offset.or_else(|| {
-                    let inner = source.get(quotes..source.len().saturating_sub(quotes))?;
-                    crate::expr::first_use(inner, fault.symbol.as_deref()?)
-                });
+                let inside = match &fault.within {
+                    Within::Value => None,
+                    Within::Byte(at) => Some(*at),
+                    Within::Use(symbol, number) => source
+                        .get(quotes..source.len().saturating_sub(quotes))
+                        .and_then(|inner| crate::expr::place_of_use(inner, symbol, *number)),
+                };
                 inside.map_or(span.start, |i| span.start + quotes + i)
             });
             Error { file, place: offset.map(|o| place(text, o)), key, kind: fault.kind }

@@ -4,26 +4,46 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{ClockSource, Initial, Simulation};
 use crate::error::{Error, ErrorKind};
-use crate::expr::{Expr, Memory, is_identifier, is_reserved};
+use crate::expr::{Expr, is_identifier, is_reserved};
+
+/// A place in the value of a key.
+pub(crate) enum Within {
+    /// All of it.
+    Value,
+    /// This byte of an expression.
+    Byte(usize),
+    /// A use of a symbol or operator in an expression, the first being number 0.
+    Use(String, usize),
+}
 
 /// A fault before its place in the text is known.
 pub(crate) struct Fault {
     /// The key, `#key` appended where the key itself is at fault and not its value.
     pub key: String,
-    /// The symbol at fault within an expression.
-    pub symbol: Option<String>,
-    /// Byte offset within an expression.
-    pub offset: Option<usize>,
+    /// Where in the value of that key.
+    pub within: Within,
     /// What is wrong.
     pub kind: ErrorKind,
 }
 
+impl Fault {
+    /// A fault of the value at `key`.
+    pub fn of(key: impl Into<String>, kind: ErrorKind) -> Self {
+        Self { key: key.into(), within: Within::Value, kind }
+    }
+
+    /// A fault at one use of a symbol or operator in the expression at `key`, the first being number 0.
+    pub fn at_use(key: impl Into<String>, symbol: &str, number: usize, kind: ErrorKind) -> Self {
+        Self { key: key.into(), within: Within::Use(symbol.to_owned(), number), kind }
+    }
+}
+
 fn fault(key: impl Into<String>, kind: ErrorKind) -> Fault {
-    Fault { key: key.into(), symbol: None, offset: None, kind }
+    Fault::of(key, kind)
 }
 
 fn fault_in(key: &str, symbol: &str, kind: ErrorKind) -> Fault {
-    Fault { key: key.to_owned(), symbol: Some(symbol.to_owned()), offset: None, kind }
+    Fault::at_use(key, symbol, 0, kind)
 }
 
 impl Simulation {
@@ -235,67 +255,6 @@ impl Simulation {
                         return Some(fault(key, ErrorKind::Memory(message)));
                     }
                 }
-            }
-        }
-        None
-    }
-
-    fn fault_in_memory(&self) -> Option<Fault> {
-        for (key, expr) in self.expressions() {
-            let mut message = None;
-            expr.visit(&mut |e| {
-                let Expr::Memory(memory, arguments) = e else { return };
-                let constant =
-                    |a: &Expr| !a.has_memory() && a.symbols().iter().all(|s| s == "pi" || self.parameter(s).is_some());
-                let nested = |a: &Expr| {
-                    let mut found = false;
-                    let rests = |m: &Memory| matches!(m, Memory::Derivative | Memory::Delay);
-                    a.visit(&mut |e| found |= matches!(e, Expr::Memory(memory, _) if !rests(memory)));
-                    found
-                };
-                match memory {
-                    Memory::Derivative => {
-                        let of_inputs = arguments.iter().all(|a| {
-                            !a.has_memory()
-                                && a.symbols().iter().all(|s| self.state(s).is_none())
-                                && a.symbols().iter().any(|s| self.input(s).is_some())
-                        });
-                        if !of_inputs {
-                            message = Some(
-                                "`d(w)` is the time derivative of an input: w must be made of inputs and parameters"
-                                    .to_owned(),
-                            );
-                        }
-                    }
-                    // A half-width may widen with the rate of an input, or with what it was before; it must not rest on what moves with the play.
-                    Memory::Play => {
-                        if arguments
-                            .iter()
-                            .skip(1)
-                            .any(|a| a.symbols().iter().any(|s| self.state(s).is_some()) || nested(a))
-                        {
-                            message = Some(
-                                "the half-width of `play` must be made of parameters, numbers, inputs, their derivatives and delayed inputs only"
-                                    .to_owned(),
-                            );
-                        }
-                    }
-                    Memory::Delay | Memory::Lag | Memory::Relay => {
-                        if !arguments.iter().skip(1).all(constant) {
-                            let name = memory.name();
-                            let what = match memory {
-                                Memory::Relay => "thresholds",
-                                Memory::Delay => "delay",
-                                _ => "time constant",
-                            };
-                            message =
-                                Some(format!("the {what} of `{name}` must be made of parameters and numbers only"));
-                        }
-                    }
-                }
-            });
-            if let Some(message) = message {
-                return Some(fault(key, ErrorKind::Memory(message)));
             }
         }
         None

@@ -7,7 +7,7 @@ use super::Compiled;
 use super::machine::Machine;
 use super::run::{Direction, Response, Run, Tangents};
 use super::surface::Mode;
-use super::trajectory::{HUGE, empty};
+use super::trajectory::empty;
 use crate::number::{Lanes, Number};
 
 /// Who moves a lane.
@@ -72,8 +72,8 @@ impl<'a, const L: usize, const T: usize> Lockstep<'a, L, T> {
                 if self.lanes[lane] == Lane::Done {
                     continue;
                 }
-                if y.iter().chain(&self.together.x).any(|v| !(v.value_of(lane).abs() < HUGE)) {
-                    response.diverged = Some(n);
+                let of_lane = |v: &Lanes<L, T>| v.value_of(lane);
+                if response.ends_at(n, y.iter().map(of_lane), self.together.x.iter().map(of_lane)) {
                     self.lanes[lane] = Lane::Done;
                     continue;
                 }

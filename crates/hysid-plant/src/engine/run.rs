@@ -98,6 +98,8 @@ pub struct Response {
     pub states: Vec<Vec<f64>>,
     /// The first sample at which something was not finite or beyond 1e100.
     pub diverged: Option<usize>,
+    /// The output at fault there, by its number, where the states are all well.
+    pub diverged_output: Option<usize>,
 }
 
 /// What a response is differentiated by.

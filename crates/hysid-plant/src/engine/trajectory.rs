@@ -7,7 +7,26 @@ use crate::document::Hold;
 use crate::number::{Number, Single};
 
 /// Beyond this size a state or output counts as diverged.
-pub(super) const HUGE: f64 = 1e100;
+const HUGE: f64 = 1e100;
+
+impl Response {
+    /// Ends the response at sample `n` if an output or a state there is not finite or beyond [`HUGE`]; returns whether it is.
+    pub(super) fn ends_at(
+        &mut self,
+        n: usize,
+        mut y: impl Iterator<Item = f64>,
+        mut x: impl Iterator<Item = f64>,
+    ) -> bool {
+        let bad = |v: f64| !(v.abs() < HUGE);
+        let output = y.position(bad);
+        let state = x.any(bad);
+        if output.is_some() || state {
+            self.diverged = Some(n);
+            self.diverged_output = output.filter(|_| !state);
+        }
+        self.diverged.is_some()
+    }
+}
 
 impl<N: Number> Machine<'_, N> {
     /// Whether the arguments of surfaces jump at samples.
@@ -24,7 +43,12 @@ impl<N: Number> Machine<'_, N> {
 
 /// A response of this size, `NaN` throughout.
 pub(super) fn empty(outputs: usize, states: usize, len: usize) -> Response {
-    Response { outputs: vec![vec![f64::NAN; len]; outputs], states: vec![vec![f64::NAN; len]; states], diverged: None }
+    Response {
+        outputs: vec![vec![f64::NAN; len]; outputs],
+        states: vec![vec![f64::NAN; len]; states],
+        diverged: None,
+        diverged_output: None,
+    }
 }
 
 impl<N: Single> Machine<'_, N> {
@@ -58,9 +82,7 @@ impl<N: Single> Machine<'_, N> {
                 self.refresh();
             }
             self.measure(&mut y);
-            let bad = |v: &N| !(v.value().abs() < HUGE);
-            if y.iter().chain(&self.x).any(bad) {
-                response.diverged = Some(n);
+            if response.ends_at(n, y.iter().map(|v| v.value()), self.x.iter().map(|v| v.value())) {
                 break;
             }
             for (j, y) in y.iter().enumerate() {

@@ -12,7 +12,7 @@ mod rewrite;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub use parse::ExprError;
-pub(crate) use parse::first_use;
+pub(crate) use parse::place_of_use;
 pub(crate) use print::number;
 
 /// An expression over numbers and symbols.

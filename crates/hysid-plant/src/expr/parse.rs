@@ -241,8 +241,9 @@ impl Expr {
     }
 }
 
-/// Byte offset of the first use of `symbol` in an expression's text.
-pub(crate) fn first_use(text: &str, symbol: &str) -> Option<usize> {
+/// Byte offset of a use of `symbol` in an expression's text; the first one is number 0.
+pub(crate) fn place_of_use(text: &str, symbol: &str, number: usize) -> Option<usize> {
     let found = tokens(text).ok()?;
-    found.into_iter().find(|(_, token)| matches!(token, Token::Name(name) if *name == symbol)).map(|(at, _)| at)
+    let mut uses = found.into_iter().filter(|(_, token)| matches!(token, Token::Name(name) if *name == symbol));
+    uses.nth(number).map(|(at, _)| at)
 }

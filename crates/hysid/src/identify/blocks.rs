@@ -68,7 +68,7 @@ fn look(
     Ok(found)
 }
 
-/// Every way of sharing one linear model's poles, with each corner.
+/// Every way of sharing one linear model's poles, with each corner; none where its poles cannot be found.
 fn starts(desk: &Desk<'_>, linear: &Linear) -> Vec<Family> {
     let mut a = vec![0.0; linear.family.ny];
     for (term, theta) in linear.stage.fit.terms.iter().zip(&linear.stage.fit.theta) {
@@ -78,7 +78,7 @@ fn starts(desk: &Desk<'_>, linear: &Linear) -> Vec<Family> {
             a[lag - 1] = -theta;
         }
     }
-    let factors = pole_factors(&a);
+    let Some(factors) = pole_factors(&a) else { return Vec::new() };
     let first = desk.options.input_delay.unwrap_or(0);
     let mut out = Vec::new();
     for choice in 0..1usize << factors.len() {

@@ -35,6 +35,7 @@ pub use recipe::{Identified, Progress, Source, Stop, identify, identify_until};
 pub use report::{Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, NoiseLine, Role, Series, TermLine};
 
 use hysid_narx::NarxError;
+use hysid_signal::tell::{brief, counted, digits};
 
 /// Bad input to an identification.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -58,7 +59,7 @@ pub enum IdentifyError {
     #[error("column `{0}` has no sample")]
     Empty(String),
     /// A signal that never changes.
-    #[error("column `{column}` is constant ({value}): there is nothing to learn from it")]
+    #[error("column `{}` is constant ({}): there is nothing to learn from it", brief(column), digits(*value, 4))]
     Constant {
         /// The column.
         column: String,
@@ -67,7 +68,8 @@ pub enum IdentifyError {
     },
     /// Too short for the lags and parameters asked for.
     #[error(
-        "the recordings have {samples} usable samples in a row at most; {needed} are needed for these lags and parameters"
+        "the recordings have {} in a row at most; {needed} are needed for these lags and parameters",
+        counted(*samples, "usable sample")
     )]
     TooShort {
         /// Samples of the longest gap-free stretch.

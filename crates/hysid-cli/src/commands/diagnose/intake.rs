@@ -7,12 +7,9 @@ use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_plant::{ClockSource, Simulation};
 use hysid_signal::Recording;
 
+pub use crate::commands::files::SAME_PERIOD;
+use crate::commands::files::{no_file_twice, no_samples_twice, same_clock};
 use crate::failure::Failure;
-
-/// The column that holds the time where nothing else is said.
-const TIME: &str = "t_s";
-/// Relative difference of two sampling periods from which they contradict each other.
-pub const SAME_PERIOD: f64 = 1e-3;
 
 /// Estimation and hold-out recordings.
 #[derive(Debug)]
@@ -68,62 +65,18 @@ impl Files<'_> {
     }
 
     fn read(&self, options: &ReadOptions) -> Result<Intake, Failure> {
-        self.no_file_twice()?;
+        no_file_twice(self.estimation, self.holdout)?;
         let all = |files: &[PathBuf]| files.iter().map(|f| read(f, options)).collect::<Result<Vec<_>, _>>();
         let intake = Intake { estimation: all(self.estimation)?, holdout: all(self.holdout)? };
-        for (h, file) in intake.holdout.iter().zip(self.holdout) {
-            if let Some(e) = intake.estimation.iter().position(|e| e.same_samples(h)) {
-                return Err(Failure::BadInput(format!(
-                    "{}: it holds the same data as {}, which is a --recording; the hold-out must be data that the estimation never sees",
-                    file.display(),
-                    self.estimation[e].display()
-                )));
-            }
-        }
+        no_samples_twice((self.estimation, &intake.estimation), (self.holdout, &intake.holdout))?;
         Ok(intake)
-    }
-
-    fn no_file_twice(&self) -> Result<(), Failure> {
-        // A file that is not there is told of when it is read.
-        let known = |f: &PathBuf| std::fs::canonicalize(f).unwrap_or_else(|_| f.clone());
-        let mut seen: Vec<(PathBuf, &str)> = Vec::new();
-        for (files, role) in [(self.estimation, "--recording"), (self.holdout, "--holdout")] {
-            for file in files {
-                let path = known(file);
-                if let Some((_, before)) = seen.iter().find(|s| s.0 == path) {
-                    let why = if *before == role {
-                        format!("given twice as {role}; a recording counts once")
-                    } else {
-                        "given as --recording and as --holdout; the hold-out must be data that the estimation never sees"
-                            .to_owned()
-                    };
-                    return Err(Failure::BadInput(format!("{}: {why}", file.display())));
-                }
-                seen.push((path, role));
-            }
-        }
-        Ok(())
     }
 }
 
 fn read(file: &Path, options: &ReadOptions) -> Result<Recording, Failure> {
     let recording = read_recording(file, options).map_err(Failure::bad_input)?;
     if let TimeSource::Period(said) = options.time {
-        contradiction(file, said)?;
+        same_clock(file, said)?;
     }
     Ok(recording)
-}
-
-/// A simulation that says its period, and a recording whose time column says another.
-fn contradiction(file: &Path, said: f64) -> Result<(), Failure> {
-    let clock_only = ReadOptions { columns: Some(Vec::new()), ..ReadOptions::default() };
-    let Ok(recording) = read_recording(file, &clock_only) else { return Ok(()) };
-    let found = recording.clock().period_s;
-    if (found - said).abs() > SAME_PERIOD * said {
-        return Err(Failure::BadInput(format!(
-            "{}, column `{TIME}`: the sampling period is {found} s, but the simulation says `period_s = {said}`; write `column = \"{TIME}\"` in [time] to go by the recording",
-            file.display()
-        )));
-    }
-    Ok(())
 }

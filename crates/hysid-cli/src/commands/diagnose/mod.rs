@@ -8,18 +8,21 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use anyhow::Context;
 use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 
 use self::folder::Folder;
 use self::intake::{Files, Intake};
+use super::files::keep_inputs;
 use super::simulation_file;
+use super::threads::pool;
 use crate::failure::Failure;
 
-/// Threads at most.
-const MOST_THREADS: usize = 1024;
+/// The files that go into the folder of the results.
+const PAGE: &str = "report.html";
+const AUGMENTED: &str = "augmented.sim.toml";
+const DIAGNOSIS: &str = "diagnosis.json";
 
 /// Find what physics a simulation leaves out: where it parts from a recording, a name, a sentence, a better simulation
 #[derive(Debug, clap::Args)]
@@ -70,14 +73,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     {
         return Err(Failure::BadInput(format!("--time-limit is {limit}; allowed is a number of seconds above zero")));
     }
-    if let Some(n) = args.threads
-        && !(1..=MOST_THREADS).contains(&n)
-    {
-        return Err(Failure::BadInput(format!("--threads is {n}; allowed is 1 to {MOST_THREADS}")));
-    }
-    let threads = args.threads.unwrap_or(0);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("starting the threads")?;
-    pool.install(|| work(args))
+    pool(args.threads)?.install(|| work(args))
 }
 
 fn work(args: &Args) -> Result<(), Failure> {
@@ -88,6 +84,8 @@ fn work(args: &Args) -> Result<(), Failure> {
     let expired = |share: f64| args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > share * limit);
     let watch = Watch { progress: &progress, expired: &expired, limited: args.time_limit.is_some() };
     let files = Files { estimation: &args.recording, holdout: &args.holdout };
+    let inputs = args.simulation.iter().chain(&args.recording).chain(&args.holdout);
+    keep_inputs(&args.out, &[PAGE, AUGMENTED, DIAGNOSIS], inputs)?;
     let (outcome, folder) = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
             let (simulation, name) = simulation_file::read(file)?;
@@ -120,12 +118,12 @@ fn work(args: &Args) -> Result<(), Failure> {
     };
 
     let page = hysid_report::diagnosis::page(&outcome.file, &outcome.picture, &crate::provenance());
-    folder.text("report.html", &page)?;
+    folder.text(PAGE, &page)?;
     match &outcome.augmented {
-        Some(augmented) => folder.text("augmented.sim.toml", &augmented.to_toml())?,
-        None => folder.without("augmented.sim.toml")?,
+        Some(augmented) => folder.text(AUGMENTED, &augmented.to_toml())?,
+        None => folder.without(AUGMENTED)?,
     }
-    folder.json("diagnosis.json", &outcome.file)?;
+    folder.json(DIAGNOSIS, &outcome.file)?;
     println!("{}: {}", outcome.file.verdict.word(), outcome.file.summary);
     for f in &outcome.file.fit {
         if let (Some(before), Some(after)) = (f.rmse_before, f.rmse_after) {
