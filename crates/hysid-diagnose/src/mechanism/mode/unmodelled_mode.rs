@@ -9,22 +9,26 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
     family: Family::ExtraMode,
     block: Block::Inertia,
     places: &[Place::Force, Place::Sensor],
-    applies: |slot| slot.inputs() > 0 && (slot.place == Place::Sensor || slot.has("x")),
+    applies: |slot| slot.inputs() > 0,
     already: &[],
     law: |slot, _| {
         // A sharp resonance between two points of the grid shows in neither; a broad one does.
         let (frequencies, dampings) = (Grid::Band(25), Grid::Values(vec![0.02, 0.15]));
         if slot.place == Place::Force {
-            // A mass on a spring that hangs on the moving part: the force that accelerates it is missing there.
-            return Law::force("m_a*((2*pi*f_a)^2*(x - x_a) + 4*pi*f_a*zeta_a*(v - v_a))")
+            // A mass on a spring that hangs on the moving part: the force that accelerates it is missing there. Where only the velocity of the
+            // part is known, the spring's length stands for the two places.
+            let length = if slot.has("x") { "(x - x_a)" } else { "d_a" };
+            let acceleration = format!("(2*pi*f_a)^2*{length} + 4*pi*f_a*zeta_a*(v - v_a)");
+            let law = Law::force(format!("m_a*({acceleration})"))
                 .amplitude("m_a", slot.mass_measure(), 0.0, 5.0)
                 .shape("f_a", "1/t", frequencies)
                 .shape("zeta_a", "1", dampings)
-                .within(0.001, 0.7)
-                .state("x_a", "x", "v_a")
-                .starting_like("x")
-                .state("v_a", "x/t", "(2*pi*f_a)^2*(x - x_a) + 4*pi*f_a*zeta_a*(v - v_a)")
-                .starting_like("v");
+                .within(0.001, 0.7);
+            return if slot.has("x") {
+                law.state("x_a", "x", "v_a").starting_like("x").state("v_a", "x/t", acceleration).starting_like("v")
+            } else {
+                law.state("d_a", "v*t", "v - v_a").state("v_a", "v", acceleration).starting_like("v")
+            };
         }
         // A mode of its own beside the plant, seen by the sensor.
         let drive: String = (1..=slot.inputs()).map(|i| format!("b_{i}*u_{i} + ")).collect();
