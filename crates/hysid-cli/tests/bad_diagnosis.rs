@@ -276,6 +276,8 @@ fn requests() -> Vec<Case> {
         with("alpha 0", &["--alpha", "0"], &["--alpha is 0", "above 0"]),
         with("alpha 1", &["--alpha", "1"], &["--alpha is 1", "below 0.5"]),
         with("alpha NaN", &["--alpha", "nan"], &["--alpha is NaN"]),
+        with("no such mechanism", &["--consider", "stiction@state:v"], &["stiction", "docs/catalogue.md"]),
+        with("no such place", &["--consider", "coulomb_friction@state:w"], &["cannot stand at `state:w`", "state:v"]),
         with("no thread", &["--threads", "0"], &["--threads is 0"]),
         with("a million threads", &["--threads", "1000000"], &["--threads is 1000000"]),
         with("no time", &["--time-limit", "0"], &["--time-limit is 0"]),

@@ -97,10 +97,13 @@ pub enum DiagnoseError {
         at_s: f64,
     },
     /// A question about an effect that the simulation cannot have.
-    #[error(
-        "--consider {0}: no such mechanism at such a slot of this simulation; write MECHANISM@SLOT such as coulomb_friction@state:v, with the names that `hysid diagnose` reports"
-    )]
-    Question(String),
+    #[error("--consider {asked}: {why}")]
+    Question {
+        /// The effect, as it was written.
+        asked: String,
+        /// What is wrong, and what would be right.
+        why: String,
+    },
     /// An option outside its range.
     #[error("{option} is {given}; allowed is {allowed}")]
     Option {

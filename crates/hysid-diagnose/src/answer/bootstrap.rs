@@ -4,6 +4,7 @@
 
 use rand::RngExt;
 
+use crate::evidence::quantile;
 use crate::random::generator;
 
 /// A ratio of rms errors with its 95 % interval.
@@ -47,7 +48,7 @@ pub fn ratio_of_rms(after: &[f64], before: &[f64], seed: u64) -> Ratio {
         .filter(|r| r.is_finite())
         .collect();
     ratios.sort_by(f64::total_cmp);
-    let at = |q: f64| ratios.get(((ratios.len() as f64 - 1.0) * q).round() as usize).copied().unwrap_or(f64::NAN);
+    let at = |q: f64| quantile(&ratios, q).unwrap_or(f64::NAN);
     Ratio { value, low: at(0.025), high: at(0.975) }
 }
 

@@ -5,6 +5,7 @@ use hysid_signal::power_spectrum;
 
 use super::picture::{LawPicture, MapPicture, ParameterPicture, Picture, RecordPicture, Role, SpectrumPicture};
 use crate::data::DataSet;
+use crate::evidence::quantile;
 use crate::mechanism::Block;
 use crate::model::along;
 use crate::model::base::{Base, Interval};
@@ -150,8 +151,7 @@ fn axes(s: &Sitting<'_, '_>) -> Option<[(String, Expr); 2]> {
 fn edges(values: &[f64]) -> Option<Vec<f64>> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
-    let at = |q: f64| sorted.get((q * (sorted.len().saturating_sub(1)) as f64) as usize).copied();
-    let (low, high) = (at(0.005)?, at(0.995)?);
+    let (low, high) = (quantile(&sorted, 0.005)?, quantile(&sorted, 0.995)?);
     let edges: Vec<f64> = (0..=CELLS).map(|i| low + (high - low) * i as f64 / CELLS as f64).collect();
     edges.windows(2).all(|w| w[0] < w[1]).then_some(edges)
 }

@@ -5,6 +5,7 @@
 use hysid_signal::power_spectrum;
 
 use crate::evidence::Series;
+use crate::evidence::quantile;
 
 /// The windows of one series in which the evidence `r * g` of an effect is significant, merged, as rows.
 ///
@@ -96,7 +97,7 @@ pub fn region(coordinates: &[Coordinate], weight: &[f64]) -> Option<String> {
         sorted.sort_by(f64::total_cmp);
         let mut absolute: Vec<f64> = c.values.iter().map(|v| v.abs()).collect();
         absolute.sort_by(f64::total_cmp);
-        let q = |s: &[f64], p: f64| s.get(((s.len() as f64 - 1.0) * p) as usize).copied().unwrap_or(0.0);
+        let q = |s: &[f64], p: f64| quantile(s, p).unwrap_or(0.0);
         let scale = q(&absolute, 0.99);
         let number = |x: f64| crate::text::number(x);
         let unit = if c.unit.is_empty() { String::new() } else { format!(" {}", c.unit) };

@@ -51,12 +51,16 @@ fn followed(model: &Model<'_>, values: &Values, asked: usize) -> usize {
     [MOST_SUBSTEPS, 16, 32].into_iter().find(|s| *s < asked && !astray(s)).unwrap_or(asked)
 }
 
+/// The global calibration by plain squares, with so many iterations of its fits.
+fn settings(seed: u64, iterations: usize) -> Settings {
+    Settings { effort: Effort::Global, seed, gls_rounds: 0, iterations, ..Settings::default() }
+}
+
 /// A simulation calibrated globally on a data set, with its rms error over all outputs; `None` where that fails.
 pub fn calibrated_copy(simulation: &Simulation, data: &DataSet, seed: u64) -> Option<(Simulation, f64)> {
     let compiled = Compiled::new(simulation).ok()?;
     let all = plant_data(&compiled, data)?;
-    let settings = Settings { effort: Effort::Global, seed, gls_rounds: 0, iterations: 60, ..Settings::default() };
-    let c = compiled.calibrate(&all, &settings).ok()?;
+    let c = compiled.calibrate(&all, &settings(seed, 60)).ok()?;
     let mut copy = simulation.clone();
     for (p, x) in copy.parameters.iter_mut().zip(&c.theta) {
         p.value = *x;
@@ -69,8 +73,7 @@ pub fn calibrated_copy(simulation: &Simulation, data: &DataSet, seed: u64) -> Op
 fn global(model: &Model<'_>, simulation: &Simulation, seed: u64) -> Option<(Values, usize)> {
     let compiled = Compiled::new(simulation).ok()?;
     let all = plant_data(&compiled, model.data())?;
-    let settings = Settings { effort: Effort::Global, seed, gls_rounds: 0, iterations: 40, ..Settings::default() };
-    let c = compiled.calibrate(&all, &settings).ok()?;
+    let c = compiled.calibrate(&all, &settings(seed, 40)).ok()?;
     let mut values = Values::default();
     for (p, x) in simulation.parameters.iter().zip(&c.theta) {
         values.parameters.insert(p.name.clone(), *x);

@@ -69,13 +69,27 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
 /// What is asked must be of the catalogue, and the simulation must have a place for it.
 fn questions(request: &Request<'_>) -> Result<(), DiagnoseError> {
     let structure = Structure::of(request.simulation);
-    let is_possible = |id: &str, label: &str| {
-        mechanism(id).is_some_and(|m| structure.slots.iter().any(|s| s.label == label && m.fits(s)))
-    };
-    match request.questions.iter().flatten().find(|(id, label)| !is_possible(id, label)) {
-        Some((id, label)) => Err(DiagnoseError::Question(format!("{id}@{label}"))),
-        None => Ok(()),
+    for (id, label) in request.questions.iter().flatten() {
+        let why = match mechanism(id) {
+            None => format!(
+                "no mechanism is called `{id}`; `docs/catalogue.md` lists them, write MECHANISM@SLOT such as coulomb_friction@state:v"
+            ),
+            Some(m) => {
+                let places: Vec<&str> =
+                    structure.slots.iter().filter(|s| m.fits(s)).map(|s| s.label.as_str()).collect();
+                if places.contains(&label.as_str()) {
+                    continue;
+                }
+                let where_else = match places.as_slice() {
+                    [] => "nowhere in this simulation".to_owned(),
+                    some => format!("here it can at {}", some.join(", ")),
+                };
+                format!("`{id}` cannot stand at `{label}`; {where_else}")
+            }
+        };
+        return Err(DiagnoseError::Question { asked: format!("{id}@{label}"), why });
     }
+    Ok(())
 }
 
 /// An output that nothing moves cannot be diagnosed.

@@ -2,7 +2,8 @@
 
 use hysid_signal::turning_points;
 
-use super::signals::{Signals, mean, quantile, rms};
+use super::signals::{Signals, mean, rms};
+use crate::evidence::quantile;
 
 /// A property of the excitation; text names a symbol of the slot.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,6 +10,7 @@ use hysid_plant::{BinaryOp, Expr, Function, Hold};
 
 use super::Grid;
 use super::resolution::resolution;
+use crate::evidence::quantile;
 
 /// Share of a period over which the way on a straight line is taken: less than a step of the integration.
 const PIECE: f64 = 0.03;
@@ -222,16 +223,6 @@ pub(super) fn mean(series: &[f64]) -> f64 {
 pub(super) fn rms(series: &[f64], about: f64) -> f64 {
     let mean_square = series.iter().map(|v| (v - about).powi(2)).sum::<f64>() / series.len().max(1) as f64;
     mean_square.sqrt()
-}
-
-/// The value below which a share of the sorted values lies.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let last = sorted.len().checked_sub(1)?;
-    let at = share.clamp(0.0, 1.0) * last as f64;
-    let (below, part) = (at.floor() as usize, at.fract());
-    let low = *sorted.get(below)?;
-    let high = *sorted.get(below + 1).unwrap_or(&low);
-    Some(low + part * (high - low))
 }
 
 /// The band that holds the signal's power but for 2 % at either end, in Hz; the mean does not count.

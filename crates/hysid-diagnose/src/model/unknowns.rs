@@ -66,6 +66,7 @@ pub fn slope(y: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(dead_code)] // Only its simulation is asked for here.
 #[path = "../../tests/common/oscillator.rs"]
 mod oscillator;
 

@@ -8,6 +8,7 @@ use hysid_plant::{Expr, Function};
 use super::course::Series;
 use super::written::FORM;
 use crate::data::{DataSet, Stretch};
+use crate::evidence::quantile;
 use crate::text::number;
 
 /// What a generic term is a function of.
@@ -99,7 +100,7 @@ fn in_turn<S>(x: &[Vec<f64>], start: impl Fn(f64) -> S, next: impl Fn(&mut S, f6
 fn quantiles<const N: usize>(x: &[Vec<f64>], at: [f64; N]) -> [f64; N] {
     let mut size: Vec<f64> = x.iter().flatten().map(|v| v.abs()).collect();
     size.sort_by(f64::total_cmp);
-    at.map(|q| size.get(((size.len() as f64 - 1.0) * q) as usize).copied().unwrap_or(0.0))
+    at.map(|q| quantile(&size, q).unwrap_or(0.0))
 }
 
 /// Curves and knees of one coordinate, and what remembers it at any rate.
