@@ -4,6 +4,8 @@
 mod actuator;
 #[path = "common/oscillator.rs"]
 mod oscillator;
+#[path = "diagnose/sensed.rs"]
+mod sensed;
 #[path = "diagnose/store.rs"]
 mod store;
 

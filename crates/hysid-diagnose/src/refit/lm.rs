@@ -6,8 +6,9 @@
 //!
 //! Reference: J. J. More (1978), the scaling; H. B. Nielsen (1999), the damping.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
+use super::normal::{System, Weighting};
 use crate::evidence::{Layout, Whitener, dot, norm2};
 
 /// A stack of predictions that depends on parameters.
@@ -54,13 +55,6 @@ pub struct Fit {
     pub converged: bool,
 }
 
-/// Applies row weights (1 where there are none).
-fn weigh(rows: &mut [f64], weights: Option<&[f64]>) {
-    if let Some(w) = weights {
-        rows.iter_mut().zip(w).for_each(|(r, w)| *r *= w);
-    }
-}
-
 /// Fits `theta` from `start`; `None` when the simulation diverges at the start.
 ///
 /// `weights` multiply the whitened rows: 0 leaves a row out.
@@ -74,7 +68,7 @@ pub fn levenberg_marquardt(
 ) -> Option<Fit> {
     let theta: Vec<f64> = start.iter().zip(problem.bounds()).map(|(x, b)| x.clamp(b.0, b.1)).collect();
     let first = problem.tangent(&theta)?;
-    descend(problem, theta, first, layout, whitener, weights, options)
+    descend(problem, theta, first, Weighting { layout, whitener, weights }, options)
 }
 
 /// Goes on where a fit of the same problem ended, under another noise model, other weights or for longer: what was found of the
@@ -88,151 +82,176 @@ pub fn go_on(
     options: LmOptions,
 ) -> Option<Fit> {
     let first = (fit.residual.clone(), fit.jacobian.clone());
-    descend(problem, fit.theta.clone(), first, layout, whitener, weights, options)
+    descend(problem, fit.theta.clone(), first, Weighting { layout, whitener, weights }, options)
 }
 
 /// The fit from a point with its residual and tangents.
 fn descend(
     problem: &dyn Problem,
-    mut theta: Vec<f64>,
-    (mut residual, mut jacobian): (Vec<f64>, Vec<Vec<f64>>),
-    layout: &Layout,
-    whitener: &Whitener,
-    weights: Option<&[f64]>,
+    theta: Vec<f64>,
+    (residual, jacobian): (Vec<f64>, Vec<Vec<f64>>),
+    weighting: Weighting<'_>,
     options: LmOptions,
 ) -> Option<Fit> {
-    let bounds = problem.bounds();
-    let clamp = |i: usize, x: f64| x.clamp(bounds[i].0, bounds[i].1);
-    let k = theta.len();
-    let whiten = |stack: &[f64]| {
-        let mut w = whitener.apply(layout, stack);
-        weigh(&mut w, weights);
-        w
-    };
-    let cost_of = |residual: &[f64]| {
-        let c = norm2(&whiten(residual));
-        if c.is_finite() { c } else { f64::INFINITY }
-    };
-    let mut white = whiten(&residual);
-    let mut cost = norm2(&white);
-    if !cost.is_finite() {
+    let point = Point::new(theta, residual, jacobian, weighting);
+    if !point.cost.is_finite() {
         return None;
     }
-    let (mut mu, mut nu) = (1e-3, 2.0);
-    let mut scale = vec![0.0f64; k];
-    let mut converged = k == 0;
-    let mut iterations = 0;
-    let mut small_steps = 0;
+    let bounds = problem.bounds();
+    let scale = vec![0.0; point.theta.len()];
+    let mut descent = Descent { problem, weighting, point, scale, mu: 1e-3, nu: 2.0 };
+    let mut converged = descent.scale.is_empty();
+    let (mut iterations, mut small_steps) = (0, 0);
     while iterations < options.iterations && !converged {
         iterations += 1;
-        let columns: Vec<Vec<f64>> = jacobian.iter().map(|c| whiten(c)).collect();
-        let gradient: Vec<f64> = columns.iter().map(|c| dot(c, &white)).collect();
-        let span = |i: usize| {
-            if bounds[i].0.is_finite() && bounds[i].1.is_finite() {
-                bounds[i].1 - bounds[i].0
-            } else {
-                theta[i].abs().max(1e-12)
-            }
-        };
-        let free: Vec<usize> = (0..k)
-            .filter(|&i| {
-                let edge = 1e-9 * span(i);
-                let blocked = (theta[i] <= bounds[i].0 + edge && gradient[i] < 0.0)
-                    || (theta[i] >= bounds[i].1 - edge && gradient[i] > 0.0);
-                !blocked && norm2(&columns[i]) > 0.0 && columns[i].iter().all(|x| x.is_finite())
-            })
-            .collect();
-        for &i in &free {
-            scale[i] = scale[i].max(norm2(&columns[i]).sqrt());
-        }
-        let m = free.len();
-        if m == 0 {
-            converged = true;
-            break;
-        }
-        let mut gram = DMatrix::zeros(m, m);
-        for (a, &i) in free.iter().enumerate() {
-            for (b, &j) in free.iter().enumerate().take(a + 1) {
-                let g = dot(&columns[i], &columns[j]) / (scale[i] * scale[j]);
-                gram[(a, b)] = g;
-                gram[(b, a)] = g;
-            }
-        }
-        let rhs = DVector::from_iterator(m, free.iter().map(|&i| gradient[i] / scale[i]));
-        // Inner loop: raise the damping until a step lowers the cost.
-        let mut accepted = false;
-        for tries in 0..12 {
-            let mut damped = gram.clone();
-            for a in 0..m {
-                damped[(a, a)] += mu * gram[(a, a)].max(1e-8) + 1e-13;
-            }
-            let Some(cholesky) = damped.cholesky() else {
-                mu = (mu * nu).max(1e-10);
-                nu *= 2.0;
-                continue;
-            };
-            let step = cholesky.solve(&rhs);
-            let mut trial = theta.clone();
-            for (a, &i) in free.iter().enumerate() {
-                trial[i] = clamp(i, theta[i] + step[a] / scale[i]);
-            }
-            let change: Vec<f64> = free.iter().map(|&i| (trial[i] - theta[i]) * scale[i]).collect();
-            let length = norm2(&change);
-            if length <= 1e-24 * cost.max(1e-300) {
-                converged = true;
-                break;
-            }
-            let d = DVector::from_column_slice(&change);
-            let predicted = 2.0 * d.dot(&rhs) - (gram.clone() * &d).dot(&d);
-            // The first step is accepted in nine cases of ten: tangents are needed then, and a run without them would be for nothing.
-            let first = tries == 0;
-            let mut ahead = if first { problem.tangent(&trial) } else { None };
-            let trial_cost = match &ahead {
-                Some((r, _)) => cost_of(r),
-                None if first => f64::INFINITY,
-                None => problem.residual(&trial).map_or(f64::INFINITY, |r| cost_of(&r)),
-            };
-            let gain = (cost - trial_cost) / predicted.max(1e-300);
-            if trial_cost < cost && gain > 1e-4 {
-                let drop = (cost - trial_cost) / cost.max(1e-300);
-                let Some((r, j)) = ahead.take().or_else(|| problem.tangent(&trial)) else {
-                    mu *= nu;
-                    nu *= 2.0;
-                    continue;
-                };
-                theta = trial;
-                residual = r;
-                jacobian = j;
-                white = whiten(&residual);
-                cost = norm2(&white);
-                mu = (mu * (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 5.0)).max(1e-12);
-                nu = 2.0;
-                accepted = true;
+        match descent.improve(options.tolerance) {
+            Outcome::Lower(drop) => {
                 small_steps = if drop < options.tolerance { small_steps + 1 } else { 0 };
                 // One more step after a tiny gain: a valley's floor can be crooked.
                 converged = small_steps >= 2 || drop < 1e-3 * options.tolerance;
+            }
+            Outcome::Ended => converged = true,
+            Outcome::Stuck => {
+                converged = descent.mu > 1e10;
                 break;
             }
-            if predicted <= options.tolerance * 1e-2 * cost {
-                converged = true;
-                break;
-            }
-            mu *= nu;
-            nu *= 2.0;
-        }
-        if !accepted {
-            converged = converged || mu > 1e10;
-            break;
         }
     }
-    let at_bound = (0..k)
-        .map(|i| {
-            let (lo, hi) = bounds[i];
-            let span = if lo.is_finite() && hi.is_finite() { hi - lo } else { theta[i].abs() };
-            (theta[i] - lo).abs() <= 1e-6 * span || (hi - theta[i]).abs() <= 1e-6 * span
+    let Point { theta, residual, jacobian, cost, .. } = descent.point;
+    let at_bound = (theta.iter().zip(bounds))
+        .map(|(x, &(lo, hi))| {
+            let span = if lo.is_finite() && hi.is_finite() { hi - lo } else { x.abs() };
+            (x - lo).abs() <= 1e-6 * span || (hi - x).abs() <= 1e-6 * span
         })
         .collect();
     Some(Fit { theta, cost, residual, jacobian, at_bound, iterations, converged })
+}
+
+/// A point with all that is known of it.
+struct Point {
+    theta: Vec<f64>,
+    residual: Vec<f64>,
+    jacobian: Vec<Vec<f64>>,
+    /// The weighted residual.
+    white: Vec<f64>,
+    cost: f64,
+}
+
+impl Point {
+    fn new(theta: Vec<f64>, residual: Vec<f64>, jacobian: Vec<Vec<f64>>, weighting: Weighting<'_>) -> Self {
+        let white = weighting.apply(&residual);
+        let cost = norm2(&white);
+        Self { theta, residual, jacobian, white, cost }
+    }
+}
+
+/// What an iteration came to.
+enum Outcome {
+    /// A point that is lower by this share of the cost.
+    Lower(f64),
+    /// There is nothing to gain.
+    Ended,
+    /// No step led down.
+    Stuck,
+}
+
+/// Steps that an iteration tries, each damped more than the one before.
+const TRIES: usize = 12;
+/// Share of the predicted gain that a step must bring.
+const WORTH: f64 = 1e-4;
+
+/// A fit under way.
+struct Descent<'a> {
+    problem: &'a dyn Problem,
+    weighting: Weighting<'a>,
+    point: Point,
+    /// Largest norm that each column has had.
+    scale: Vec<f64>,
+    /// The damping, and by what it grows when a step fails.
+    mu: f64,
+    nu: f64,
+}
+
+impl Descent<'_> {
+    /// One iteration: the damping is raised until a step lowers the cost.
+    fn improve(&mut self, tolerance: f64) -> Outcome {
+        let columns: Vec<Vec<f64>> = self.point.jacobian.iter().map(|c| self.weighting.apply(c)).collect();
+        let gradient: Vec<f64> = columns.iter().map(|c| dot(c, &self.point.white)).collect();
+        let free = self.free(&columns, &gradient);
+        for &i in &free {
+            self.scale[i] = self.scale[i].max(norm2(&columns[i]).sqrt());
+        }
+        if free.is_empty() {
+            return Outcome::Ended;
+        }
+        let system = System::new(&columns, &gradient, &free, &self.scale);
+        let cost = self.point.cost;
+        for tries in 0..TRIES {
+            let Some(step) = system.step(self.mu) else {
+                self.mu = (self.mu * self.nu).max(1e-10);
+                self.nu *= 2.0;
+                continue;
+            };
+            let trial = self.moved(&free, &step);
+            let change: Vec<f64> = free.iter().map(|&i| (trial[i] - self.point.theta[i]) * self.scale[i]).collect();
+            if norm2(&change) <= 1e-24 * cost.max(1e-300) {
+                return Outcome::Ended;
+            }
+            let predicted = system.predicted(&change);
+            // The first step is accepted in nine cases of ten: tangents are needed then, and a run without them would be for nothing.
+            let first = tries == 0;
+            let mut ahead = if first { self.problem.tangent(&trial) } else { None };
+            let trial_cost = match &ahead {
+                Some((r, _)) => self.weighting.cost(r),
+                None if first => f64::INFINITY,
+                None => self.problem.residual(&trial).map_or(f64::INFINITY, |r| self.weighting.cost(&r)),
+            };
+            let gain = (cost - trial_cost) / predicted.max(1e-300);
+            if trial_cost < cost && gain > WORTH {
+                let Some((r, j)) = ahead.take().or_else(|| self.problem.tangent(&trial)) else {
+                    self.dampen();
+                    continue;
+                };
+                self.point = Point::new(trial, r, j, self.weighting);
+                self.mu = (self.mu * (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 5.0)).max(1e-12);
+                self.nu = 2.0;
+                return Outcome::Lower((cost - trial_cost) / cost.max(1e-300));
+            }
+            if predicted <= tolerance * 1e-2 * cost {
+                return Outcome::Ended;
+            }
+            self.dampen();
+        }
+        Outcome::Stuck
+    }
+
+    fn dampen(&mut self) {
+        self.mu *= self.nu;
+        self.nu *= 2.0;
+    }
+
+    /// The parameters that can move: seen by the recording, and not pushed against a bound.
+    fn free(&self, columns: &[Vec<f64>], gradient: &[f64]) -> Vec<usize> {
+        let bounds = self.problem.bounds();
+        let can_move = |&i: &usize| {
+            let (x, (lo, hi)) = (self.point.theta[i], bounds[i]);
+            let span = if lo.is_finite() && hi.is_finite() { hi - lo } else { x.abs().max(1e-12) };
+            let edge = 1e-9 * span;
+            let blocked = (x <= lo + edge && gradient[i] < 0.0) || (x >= hi - edge && gradient[i] > 0.0);
+            !blocked && norm2(&columns[i]) > 0.0 && columns[i].iter().all(|x| x.is_finite())
+        };
+        (0..self.point.theta.len()).filter(can_move).collect()
+    }
+
+    /// The parameters after a scaled step of those that are free, within the bounds.
+    fn moved(&self, free: &[usize], step: &[f64]) -> Vec<f64> {
+        let bounds = self.problem.bounds();
+        let mut trial = self.point.theta.clone();
+        for (&i, s) in free.iter().zip(step) {
+            trial[i] = (trial[i] + s / self.scale[i]).clamp(bounds[i].0, bounds[i].1);
+        }
+        trial
+    }
 }
 
 impl Fit {
@@ -241,15 +260,8 @@ impl Fit {
     /// Column-major, `k` by `k`.
     pub fn covariance(&self, layout: &Layout, whitener: &Whitener, weights: Option<&[f64]>, variance: f64) -> Vec<f64> {
         let k = self.theta.len();
-        let columns: Vec<Vec<f64>> = self
-            .jacobian
-            .iter()
-            .map(|c| {
-                let mut w = whitener.apply(layout, c);
-                weigh(&mut w, weights);
-                w
-            })
-            .collect();
+        let weighting = Weighting { layout, whitener, weights };
+        let columns: Vec<Vec<f64>> = self.jacobian.iter().map(|c| weighting.apply(c)).collect();
         let scale: Vec<f64> = columns.iter().map(|c| norm2(c).sqrt()).collect();
         let free: Vec<usize> =
             (0..k).filter(|&i| scale[i] > 0.0 && scale[i].is_finite() && !self.at_bound[i]).collect();
