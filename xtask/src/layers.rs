@@ -33,13 +33,10 @@ struct Package {
 /// Every breach of the rules below `root`, a sentence each; empty when the house is in order.
 pub fn breaches(root: &Path) -> anyhow::Result<Vec<String>> {
     let rules: Rules = toml::from_str(&std::fs::read_to_string(root.join("xtask/layers.toml"))?)?;
-    let mut manifests = vec![root.join("xtask/Cargo.toml")];
-    for entry in std::fs::read_dir(root.join("crates"))? {
-        manifests.push(entry?.path().join("Cargo.toml"));
-    }
-    manifests.sort();
+    let manifests =
+        entries(&root.join("crates"))?.into_iter().chain([root.join("xtask")]).map(|p| p.join("Cargo.toml"));
     let mut found = Vec::new();
-    for path in manifests.iter().filter(|p| p.exists()) {
+    for path in manifests.filter(|p| p.exists()) {
         let manifest: Manifest = toml::from_str(&std::fs::read_to_string(path)?)?;
         check(&rules, &manifest, &mut found);
     }
@@ -51,9 +48,7 @@ pub fn breaches(root: &Path) -> anyhow::Result<Vec<String>> {
 
 /// Checks that each room of a crate (a folder or file beside its `lib.rs`) names only rooms that come before it. Tests may look anywhere.
 fn rooms(source: &Path, name: &str, order: &[String], found: &mut Vec<String>) -> anyhow::Result<()> {
-    let mut entries: Vec<PathBuf> = std::fs::read_dir(source)?.map(|e| Ok(e?.path())).collect::<anyhow::Result<_>>()?;
-    entries.sort();
-    for entry in entries {
+    for entry in entries(source)? {
         let room = entry.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         if room == "lib" {
             continue;
@@ -79,13 +74,17 @@ fn rooms(source: &Path, name: &str, order: &[String], found: &mut Vec<String>) -
     Ok(())
 }
 
+/// What lies in a folder, in the order of its names.
+fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let mut found: Vec<PathBuf> = std::fs::read_dir(folder)?.map(|e| Ok(e?.path())).collect::<anyhow::Result<_>>()?;
+    found.sort();
+    Ok(found)
+}
+
 /// All source files at a path, in the order of their names.
 fn sources(path: &Path, out: &mut Vec<PathBuf>) -> anyhow::Result<()> {
     if path.is_dir() {
-        let mut entries: Vec<PathBuf> =
-            std::fs::read_dir(path)?.map(|e| Ok(e?.path())).collect::<anyhow::Result<_>>()?;
-        entries.sort();
-        return entries.iter().try_for_each(|e| sources(e, out));
+        return entries(path)?.iter().try_for_each(|e| sources(e, out));
     }
     if path.extension().is_some_and(|e| e == "rs") {
         out.push(path.to_owned());

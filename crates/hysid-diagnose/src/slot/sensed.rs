@@ -84,7 +84,8 @@ fn multiple(simulation: &Simulation, a: &Expr, b: &Expr) -> Option<f64> {
         }
         known = Some(times);
     }
-    known
+    // What is the same for all numbers is a count of equal terms: whole, but for rounding.
+    known.map(|k| if (k - k.round()).abs() <= 1e3 * ROUNDING { k.round() } else { k })
 }
 
 /// An expression with other numbers in it, the same ones for the same; exponents stay, since a negative number has no other powers.
@@ -119,8 +120,8 @@ fn values(simulation: &Simulation, expressions: [Expr; 2], round: u64) -> Option
     let compiled = Compiled::new(&probe).ok()?;
     let samples = |i: usize| (0..3).map(|n| scatter(round, 1000 + (10 * i + n) as u64)).collect();
     let drive = Drive::new(0.0, 1.0, 3, (0..probe.inputs.len()).map(samples).collect()).ok()?;
-    let shaken = |p: &Parameter| p.value * (1.0 + 0.3 * scatter(round, hash(&p.name)));
-    let mut theta: Vec<f64> = probe.parameters.iter().map(shaken).collect();
+    let shaken = |(i, p): (usize, &Parameter)| p.value * (1.0 + 0.3 * scatter(round, 2000 + i as u64));
+    let mut theta: Vec<f64> = probe.parameters.iter().enumerate().map(shaken).collect();
     let mut out = Vec::new();
     for point in 0..POINTS {
         for (place, state) in theta[own..].iter_mut().enumerate() {
@@ -131,11 +132,6 @@ fn values(simulation: &Simulation, expressions: [Expr; 2], round: u64) -> Option
         out.push([at(0)?, at(1)?]);
     }
     Some(out)
-}
-
-/// A number of a name.
-fn hash(name: &str) -> u64 {
-    name.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// A number between -1 and 1 that looks random.

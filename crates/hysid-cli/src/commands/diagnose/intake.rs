@@ -7,7 +7,6 @@ use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_plant::{ClockSource, Simulation};
 use hysid_signal::Recording;
 
-pub use crate::commands::files::SAME_PERIOD;
 use crate::commands::files::{no_file_twice, no_samples_twice, same_clock};
 use crate::failure::Failure;
 
