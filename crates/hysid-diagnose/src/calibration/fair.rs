@@ -7,7 +7,7 @@ use crate::model::hypothesis::Setting;
 use crate::model::{Model, Values};
 use crate::request::Request;
 
-/// Plain rms error, over that of the calibration, at which a fit under a noise model has given up explaining.
+/// Error (rms), over that of the calibration, at which a fit under a noise model has given up explaining.
 pub const WORSE: f64 = 1.05;
 
 /// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
@@ -37,13 +37,17 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
             at_s: s.start_s + sample as f64 * s.drive.period_s(),
         });
     };
-    let rms = |b: &Base<'_>| setting.data.relative_squares(&b.fit.residual).sqrt();
     // Under its own noise, twice.
     let polished = setting.further(&best, Some(&best.whitener), 2, 20);
     Ok(match polished {
         // Noise of any colour may not explain what the simulation can. Where it is a force through the plant the plain squares are no judge:
         // parameters follow its slow wander, and an effect that is fitted under the noise would win by undoing that.
-        Some(p) if p.log_likelihood > best.log_likelihood && (p.driven() || rms(&p) < WORSE * rms(&best)) => p,
+        Some(p)
+            if p.log_likelihood > best.log_likelihood
+                && (p.driven() || p.unexplained() < WORSE.powi(2) * best.unexplained()) =>
+        {
+            p
+        }
         _ => best,
     })
 }

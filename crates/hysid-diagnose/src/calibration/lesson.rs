@@ -131,8 +131,7 @@ pub fn lesson<'d>(
 /// The simulation without effects, fitted from where its parameters are beside those of a set; `None` where that leaves a much larger plain error.
 fn returned<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, h: &Hypothesis<'d>) -> Option<Base<'d>> {
     let b = setting.fit(&setting.original, &h.base.values(), Some(&none.base.whitener), 2, 20)?;
-    let error = |b: &Base<'_>| setting.data.relative_squares(&b.fit.residual);
-    (b.driven() || error(&b) < WORSE.powi(2) * error(&none.base)).then_some(b)
+    (b.driven() || b.unexplained() < WORSE.powi(2) * none.base.unexplained()).then_some(b)
 }
 
 /// Integration steps in each sampling period that a fitted set needs: as many as leave no error that could decide between two sets.

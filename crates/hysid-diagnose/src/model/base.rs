@@ -190,6 +190,17 @@ impl Base<'_> {
         data.relative_squares(&self.fit.residual) > FAR * FAR * data.rows() as f64
     }
 
+    /// Sum of squares of the residual, each output in units of its scale. Of the means only that counts which is not the noise's: under 1/f noise a fit
+    /// whose parameters follow the mean would pass for the better one.
+    pub fn unexplained(&self) -> f64 {
+        let data = self.model.data();
+        let mut left = self.fit.residual.clone();
+        for s in &data.layout.series {
+            self.whitener.models[s.output].discount_mean(&mut left[s.rows.clone()]);
+        }
+        data.relative_squares(&left)
+    }
+
     /// The document with the fitted values.
     pub fn document(&self) -> Simulation {
         self.model.document(&self.fit.theta)
