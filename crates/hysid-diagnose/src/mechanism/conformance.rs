@@ -37,7 +37,9 @@ specimens!(
     "motor",
     "filter",
     "controlled_damper",
-    "stalling_wing"
+    "stalling_wing",
+    "cylinder",
+    "shaker"
 );
 
 /// A breach of the suite's laws.
@@ -155,7 +157,7 @@ pub fn check_form(
                 .iter()
                 .map(|r| Value { name: r.name.clone(), value: 1.0, unit: r.unit.clone() })
                 .collect();
-            for named in placeholders(mechanism.sentence, purpose == Purpose::Refit) {
+            for named in placeholders(mechanism.sentence) {
                 if named != "place" && named != "parameter" && !values.iter().any(|v| v.name == named) {
                     breach(format!("the sentence names {named}, which is not reported"));
                 }
@@ -170,9 +172,9 @@ pub fn check_form(
     breaches
 }
 
-/// The values that a sentence names; the plain form has those in brackets too.
-fn placeholders(sentence: &str, plain: bool) -> Vec<&str> {
-    let parts = sentence.split(['[', ']']).enumerate().filter(|(i, _)| plain || i % 2 == 0);
+/// The values that a sentence names whatever the form: not those in brackets.
+fn placeholders(sentence: &str) -> Vec<&str> {
+    let parts = sentence.split(['[', ']']).enumerate().filter(|(i, _)| i % 2 == 0);
     let named = parts.flat_map(|(_, part)| part.split('{').skip(1));
     named.filter_map(|part| part.split_once('}').map(|(name, _)| name)).collect()
 }
@@ -205,6 +207,8 @@ const EXCITATION: &[(f64, f64)] = &[
     (1e-5, 0.5),
     (0.01, 4.0),
     (0.01, 16.0),
+    (0.002, 100.0),
+    (0.0004, 10.0),
 ];
 
 /// A bench for each specimen.

@@ -69,10 +69,34 @@ pub(crate) fn only_parameters(simulation: &Simulation, expr: &Expr) -> bool {
     expr.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some())
 }
 
-/// An expression for the size of a sum: the sum of the absolute values of its terms.
-pub(crate) fn size(expr: &Expr) -> Expr {
-    let terms = expr.terms().into_iter().map(|(_, term)| term.clone().abs());
-    terms.reduce(|a, b| a + b).unwrap_or(Expr::Number(0.0))
+/// An expression for the size of a sum: the sum of the absolute values of its terms, also where the sum as a whole is multiplied or divided by
+/// parameters.
+///
+/// A difference without a parameter of its own, as in `k*(x1 - x2)`, is one signal.
+pub(crate) fn size(simulation: &Simulation, expr: &Expr) -> Expr {
+    let constant = |e: &Expr| only_parameters(simulation, e);
+    let within = |e: &Expr| size(simulation, e);
+    match expr {
+        Expr::Binary(BinaryOp::Mul, a, b) if constant(a) && is_a_sum(simulation, b) => a.clone().abs() * within(b),
+        Expr::Binary(BinaryOp::Mul, a, b) if constant(b) && is_a_sum(simulation, a) => within(a) * b.clone().abs(),
+        Expr::Binary(BinaryOp::Div, a, b) if constant(b) && is_a_sum(simulation, a) => within(a) / b.clone().abs(),
+        _ => {
+            let terms = expr.terms().into_iter().map(|(_, term)| term.clone().abs());
+            terms.reduce(|a, b| a + b).unwrap_or(Expr::Number(0.0))
+        }
+    }
+}
+
+/// Whether an expression is a sum of several things, or that times parameters.
+fn is_a_sum(simulation: &Simulation, expr: &Expr) -> bool {
+    match expr {
+        Expr::Binary(BinaryOp::Mul, a, b) if only_parameters(simulation, a) => is_a_sum(simulation, b),
+        Expr::Binary(BinaryOp::Mul | BinaryOp::Div, a, b) if only_parameters(simulation, b) => is_a_sum(simulation, a),
+        _ => {
+            let terms = expr.terms();
+            terms.len() > 1 && terms.iter().any(|(_, t)| t.symbols().iter().any(|s| simulation.parameter(s).is_some()))
+        }
+    }
 }
 
 /// Whether a term of the sum is made of estimated parameters only: an offset that the fit already has.
@@ -114,6 +138,19 @@ mod tests {
         check("c*m", "k*m", "c/k");
         check("c", "k*m", "c/(k*m)");
         check("k*(-c)", "k", "-c");
+    }
+
+    #[test]
+    fn the_size_of_a_sum_is_that_of_its_terms_also_under_a_factor() {
+        let check = |text: &str, expected: &str| {
+            assert_eq!(size(&simulation(), &Expr::parse(text).unwrap()).to_string(), expected, "{text}");
+        };
+        check("u - k*x", "abs(u) + abs(k*x)");
+        check("1000*(u - k*x)", "abs(1000)*(abs(u) + abs(k*x))");
+        check("k*(2*(u - c*v))/m", "abs(k)*(abs(2)*(abs(u) + abs(c*v)))/abs(m)");
+        // One spring, not two forces.
+        check("k*(x - v)", "abs(k*(x - v))");
+        check("2*u*(x - c*v)", "abs(2*u*(x - c*v))");
     }
 
     #[test]

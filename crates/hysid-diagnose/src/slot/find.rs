@@ -1,6 +1,6 @@
 //! The slots of a simulation, found from its equations.
 
-use hysid_plant::{Expr, Function, Memory, Simulation, Unit};
+use hysid_plant::{Expr, Function, Memory, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
 use super::motion::{ForcePath, Kinematic, Motion, force_path, kinematic, motions};
@@ -50,6 +50,11 @@ impl Structure {
     }
 }
 
+/// Whether a unit measures the same as one of these.
+fn is_one_of(unit: &Unit, names: &[&str]) -> bool {
+    names.iter().filter_map(|name| Unit::parse(name).ok()).any(|u| u.same_dimension(unit))
+}
+
 /// Looks for the slots of each kind.
 pub(super) struct Finder<'a> {
     pub simulation: &'a Simulation,
@@ -81,11 +86,15 @@ impl Finder<'_> {
         self.simulation.expressions().into_iter().map(|(_, e)| e.clone()).collect()
     }
 
+    /// Whether a state is the displacement or the velocity of a part.
+    fn moves(&self, name: &str) -> bool {
+        self.motions.iter().any(|m| m.v == name || m.x == Some(name))
+    }
+
     /// Whether a state besides the motions has a loop in this velocity.
     pub(super) fn loops(&self, v: &Expr) -> bool {
-        let moving = |name: &str| self.motions.iter().any(|m| m.v == name || m.x == Some(name));
         let mut found = false;
-        for state in self.simulation.states.iter().filter(|s| !moving(&s.name)) {
+        for state in self.simulation.states.iter().filter(|s| !self.moves(&s.name)) {
             state.derivative.visit(&mut |e| found |= matches!(e, Expr::Call(Function::Abs, a) if a.first() == Some(v)));
         }
         found
@@ -121,6 +130,9 @@ impl Finder<'_> {
                 if let Some(x) = motion.x {
                     slot.offer(self.simulation, "x", Expr::symbol(x));
                 }
+            } else if let Some((current, motion)) = self.winding(symbol) {
+                slot.offer(self.simulation, "i", Expr::symbol(current));
+                slot.offer(self.simulation, "v", Expr::symbol(motion.v));
             }
             let into = self.simulation.states.iter().filter(|s| s.derivative.uses(symbol));
             slot.constant = into.into_iter().any(|s| match force_path(self.simulation, &s.derivative) {
@@ -218,6 +230,14 @@ impl Finder<'_> {
         shares.all(|s| s.as_ref() == Some(&first)).then_some(first)
     }
 
+    /// The current of a winding that an input drives, and the motion that it moves; `None` where the winding feels the speed already.
+    fn winding(&self, input: &str) -> Option<(&str, &Motion<'_>)> {
+        let current = |s: &&State| self.simulation.unit_of(&s.name).is_none_or(|u| is_one_of(&u, &["A"]));
+        let driven = self.simulation.states.iter().filter(|s| s.derivative.uses(input) && !self.moves(&s.name));
+        let moved = |s: &State| self.motions.iter().find(|m| m.derivative.uses(&s.name) && !s.derivative.uses(m.v));
+        driven.filter(current).find_map(|s| Some((s.name.as_str(), moved(s)?)))
+    }
+
     /// A measured quantity has the unit that its column's name ends in.
     pub(super) fn name_unit(&self, slot: &mut Slot, symbol: &str, column: &str) {
         if let (Some(unit), Some(quantity)) = (Unit::of_column(column), slot.symbols.get_mut(symbol)) {
@@ -235,10 +255,15 @@ impl Finder<'_> {
     }
 
     fn stores(&self) -> Vec<Slot> {
-        if !self.motions.is_empty() || self.is_force_law() {
+        if self.is_force_law() {
             return Vec::new();
         }
-        let states = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some());
+        // Beside a motion a state may be a controller's or a filter's: only what has the unit of something held is a store.
+        let holds = |name: &str| {
+            let unit = self.simulation.unit_of(name);
+            self.motions.is_empty() || (!self.moves(name) && unit.is_some_and(|u| is_one_of(&u, &["Pa", "K", "m^3"])))
+        };
+        let states = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some() && holds(&s.name));
         states.map(|s| self.store_slot(Place::Store, format!("state:{}", s.name), &s.name, &s.derivative)).collect()
     }
 
@@ -296,10 +321,15 @@ impl Finder<'_> {
             let moved = self.motions.iter().find(|m| m.derivative.uses(name)).or(self.motions.first());
             if let Some(motion) = moved {
                 slot.offer(self.simulation, "v", Expr::symbol(motion.v));
-            } else if let Some(law) = self.force_laws().first()
-                && let Some(v) = law.quantity("v")
-            {
-                slot.offer(self.simulation, "v", v.expression.clone());
+                if let Some(x) = motion.x {
+                    slot.offer(self.simulation, "x", Expr::symbol(x));
+                }
+            } else if let Some(law) = self.force_laws().first() {
+                for symbol in ["v", "x"] {
+                    if let Some(q) = law.quantity(symbol) {
+                        slot.offer(self.simulation, symbol, q.expression.clone());
+                    }
+                }
             }
             slot.context = self.equations();
             slots.push(slot);

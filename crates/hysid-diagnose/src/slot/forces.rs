@@ -14,15 +14,15 @@ impl Finder<'_> {
         let below = |symbol: &str, force: &Expr| Some((-linear_coefficient(simulation, force, symbol)?).simplified());
         let (force, mass) = match force_path(simulation, derivative) {
             ForcePath::Quotient(force, mass) => {
-                slot.offer(simulation, "F", size(force));
+                slot.offer(simulation, "F", size(simulation, force));
                 (force, Some(mass))
             }
             ForcePath::Divided(mass) => {
-                slot.offer(simulation, "F", mass.clone() * size(derivative));
+                slot.offer(simulation, "F", mass.clone() * size(simulation, derivative));
                 (derivative, Some(mass))
             }
             ForcePath::Bare => {
-                slot.offer(simulation, "F", size(derivative));
+                slot.offer(simulation, "F", size(simulation, derivative));
                 (derivative, None)
             }
         };

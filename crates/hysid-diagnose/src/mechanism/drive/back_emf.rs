@@ -20,7 +20,9 @@ pub static BACK_EMF: Mechanism = Mechanism {
     places: &[Place::Input],
     applies: |slot| slot.has("v"),
     already: &["lag(u - P*v, Q)"],
-    law: |_, purpose| match purpose {
+    law: |slot, purpose| match purpose {
+        // The simulation has the winding's resistance and inductance.
+        _ if slot.has("i") => Law::replace("u - k_e*v").amplitude("k_e", "u/v", 0.0, 5.0),
         Purpose::Screening => Law::replace("u + w*(lag(u, tau_e) - u) - k_e*lag(v, tau_e)")
             .weight()
             .amplitude("k_e", "u/v", 0.0, 5.0)
@@ -43,7 +45,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
     contains: &["actuator_lag"],
     confusable: &["actuator_lag", "delay"],
     needs: &[Need::Band(3.0)],
-    sentence: "The drive has an electrical side {place}: a back-EMF of {k_e} and a time constant of {tau_e}.",
+    sentence: "The drive has an electrical side {place}: a back-EMF of {k_e}[ and a time constant of {tau_e}].",
     signature: "An input that weakens with the speed and lags.",
     reference: "W. Leonhard, Control of Electrical Drives, 3rd ed., Springer (2001)",
 };
