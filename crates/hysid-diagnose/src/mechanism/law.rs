@@ -7,6 +7,8 @@
 //! A `measure` is text as well: `F/x^3` says both the unit of a parameter and its natural size on a recording (the rms of the
 //! force over the cubed rms of the displacement). `T` is the recording's duration, `h` its sampling period, both in seconds.
 
+use super::grid::Grid;
+
 /// What a law is written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Purpose {
@@ -73,29 +75,6 @@ pub enum Change {
     },
 }
 
-/// The values that a shape parameter is tried at.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Grid {
-    /// These multiples of the measure.
-    Values(Vec<f64>),
-    /// These shares of half the range of a slot's signal.
-    Reach(&'static str, Vec<f64>),
-    /// Quantiles of the absolute value of a slot's signal.
-    Quantiles(&'static str, Vec<f64>),
-    /// Quantiles of a slot's signal.
-    SignedQuantiles(&'static str, Vec<f64>),
-    /// That many points inside the recording's duration, in seconds.
-    Times(usize),
-    /// That many frequencies over the excited band, in Hz, logarithmic.
-    Band(usize),
-    /// That many time constants from the excited band's fastest to a quarter of the recording, in seconds, logarithmic.
-    Memory(usize),
-    /// Frequencies of the largest peaks of the residual, else that many over the whole band, in Hz.
-    Peaks(usize),
-    /// The smallest step between the recorded values of the slot's output.
-    Resolution,
-}
-
 /// What a law's parameter is to the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Role {
@@ -120,6 +99,8 @@ pub struct LawParameter {
     pub range: Option<(f64, f64)>,
     /// A further lower bound: that many times another measure. Keeps a law within what the integration step can follow.
     pub floor: Option<(String, f64)>,
+    /// Below that many times another measure the law looks like one of another kind, in words: nothing is firm there.
+    pub told_from: Option<(String, f64, &'static str)>,
     /// The value at which the rewritten simulation is the baseline whatever the others are, in multiples of the measure.
     pub neutral: Option<f64>,
     /// Whether it is reported under its own name.
@@ -263,6 +244,7 @@ impl Law {
             role,
             range: None,
             floor: None,
+            told_from: None,
             neutral: None,
             reported: true,
             searched: false,
@@ -288,6 +270,13 @@ impl Law {
     pub fn at_least(self, times: f64, measure: &str) -> Self {
         let floor = Some((measure.to_owned(), times));
         self.last(|p| p.floor = floor)
+    }
+
+    /// Below `times` the size of another measure the last parameter makes the law look like one of another kind, in words.
+    #[must_use]
+    pub fn told_from(self, times: f64, measure: &str, below: &'static str) -> Self {
+        let told_from = Some((measure.to_owned(), times, below));
+        self.last(|p| p.told_from = told_from)
     }
 
     /// The value of the last parameter at which the simulation is the baseline, in multiples of its measure.
@@ -385,15 +374,4 @@ impl Law {
         self.derived.push(Derived { name, measure: measure.into(), value: value.into() });
         self
     }
-}
-
-/// `count` logarithmic steps from `low` to `high`.
-pub(crate) fn log_steps(low: f64, high: f64, count: usize) -> Vec<f64> {
-    let last = count.saturating_sub(1).max(1) as f64;
-    (0..count).map(|i| low * (high / low).powf(i as f64 / last)).collect()
-}
-
-/// A grid of `count` logarithmic multiples of the measure.
-pub(crate) fn log_grid(low: f64, high: f64, count: usize) -> Grid {
-    Grid::Values(log_steps(low, high, count))
 }

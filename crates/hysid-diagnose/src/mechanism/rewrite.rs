@@ -251,6 +251,10 @@ fn write_law(
     let mut amplitudes = Vec::new();
     let mut shapes = Vec::new();
     let mut neutral = Vec::new();
+    let multiple = |times: f64, measure: &str| {
+        let size = Expr::parse(measure).ok().and_then(|m| signals.size_of(&m));
+        size.map(|size| times * size)
+    };
     for parameter in &law.parameters {
         let measure = Expr::parse(&parameter.measure).map_err(|e| format!("`{}`: {e}", parameter.measure))?;
         let size = signals.size_of(&measure).filter(|s| s.is_finite() && *s > 0.0).unwrap_or(1.0);
@@ -271,8 +275,7 @@ fn write_law(
                     None => signals.bounds(grid, &values),
                 };
                 if let Some((measure, times)) = &parameter.floor {
-                    let floor = Expr::parse(measure).ok().and_then(|m| signals.size_of(&m));
-                    low = low.max(floor.map_or(low, |f| times * f));
+                    low = low.max(multiple(*times, measure).unwrap_or(low));
                     high = high.max(3.0 * low);
                 }
                 values.iter_mut().for_each(|v| *v = v.clamp(low, high));
@@ -280,7 +283,9 @@ fn write_law(
                 new.value = values.get(values.len() / 2).copied().unwrap_or(size);
                 new = new.within(low, high);
                 let (searched, places) = (parameter.searched, Places::of(grid));
-                shapes.push(Shape { name: name.clone(), grid: values, searched, places });
+                let from = parameter.told_from.as_ref();
+                let told_from = from.and_then(|(measure, times, below)| Some((multiple(*times, measure)?, *below)));
+                shapes.push(Shape { name: name.clone(), grid: values, searched, places, told_from });
             }
             Role::Constant(grid) => {
                 new.value = signals.values(grid, size).first().copied().unwrap_or(size);

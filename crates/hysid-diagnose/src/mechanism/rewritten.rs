@@ -24,6 +24,8 @@ pub struct Shape {
     pub searched: bool,
     /// What of the recording the values were taken from.
     pub places: Places,
+    /// The value below which the law looks like one of another kind on this recording, and that kind in words.
+    pub told_from: Option<(f64, &'static str)>,
 }
 
 /// What of a recording the values of a shape point to: an effect that is looked for at many places is found at one of them by chance.

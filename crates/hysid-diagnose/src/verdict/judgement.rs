@@ -152,10 +152,19 @@ fn veto(best: &Hypothesis<'_>, least: &Hypothesis<'_>, worse_on_blocks: bool) ->
 
 /// What the recording lacks for a firm answer about each effect of the best set; `None` where nothing is lacking.
 fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String>> {
+    let values = best.base.values();
     let told = |e: &Effect| {
-        let candidate = candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?;
+        let id = e.mechanism.id;
+        let confused = e.written.shapes.iter().find_map(|shape| {
+            let (from, below) = shape.told_from?;
+            (values.parameters.get(&shape.name)? < &from).then_some(below)
+        });
+        if let Some(confused) = confused {
+            return Some(format!("{id}: this is not firm, since {confused}"));
+        }
+        let candidate = candidates.iter().find(|c| c.mechanism.id == id && c.slot.label == e.slot.label)?;
         let lacking = candidate.lacking.as_ref()?;
-        Some(format!("{}: for a firm answer the recording lacks something: {lacking}", e.mechanism.id))
+        Some(format!("{id}: for a firm answer the recording lacks something: {lacking}"))
     };
     best.effects.iter().map(told).collect()
 }

@@ -106,6 +106,8 @@ fn a_mechanism_is_recovered_from_its_own_simulation() {
     check("Circuit", "input_saturation");
     check("Controlled", "coulomb_friction");
     check("Controlled", "dahl_friction");
+    check("Hydraulic", "leakage");
+    check("Shaker", "back_emf");
     check("Stalling", "stall_lag");
     // Between the two filters.
     check_at("Circuit", "input_saturation", 1);
@@ -175,5 +177,39 @@ fn only_a_controlled_damping_has_a_control() {
         let controlled = simulation.title.starts_with("Controlled");
         let has = Structure::of(&simulation).slots.iter().any(|s| s.has("control"));
         assert_eq!(has, controlled, "{}", simulation.title);
+    }
+}
+
+/// A plant that moves has stores and windings too, where the units say so.
+#[test]
+fn what_is_held_or_wound_beside_a_motion_is_found() {
+    let specimen = |name: &str| specimens().swap_remove(SPECIMENS.iter().position(|(n, _)| *n == name).unwrap());
+    let stands = |id: &str, name: &str| -> Vec<String> {
+        let mechanism = crate::mechanism::mechanism(id).unwrap();
+        mechanism.slots(&Structure::of(&specimen(name))).into_iter().map(|slot| slot.label).collect()
+    };
+    assert_eq!(stands("leakage", "cylinder"), ["state:p"]);
+    assert!(stands("leakage", "shaker").is_empty() && stands("leakage", "oscillator").is_empty());
+    assert_eq!(stands("back_emf", "shaker"), ["input:u"]);
+    // What is wound lacks the induced voltage alone.
+    let shaker = specimen("shaker");
+    let slot = Structure::of(&shaker).slots.into_iter().find(|s| s.label == "input:u").unwrap();
+    assert_eq!(slot.quantity("i").unwrap().expression.to_string(), "i");
+    let mut induced = shaker;
+    induced.state_mut("i").unwrap().derivative = hysid_plant::Expr::parse("(u - R*i - k_F*v)/L").unwrap();
+    assert!(!Structure::of(&induced).slots.iter().any(|s| s.label == "input:u" && s.has("i")));
+}
+
+/// Heat that follows within a period of the motion is told from there on, in seconds.
+#[test]
+fn the_period_of_the_motion_is_the_least_time_constant_of_heat() {
+    for bench in benches().iter().filter(|b| b.simulation.state("v").is_some() && b.simulation.state("x").is_some()) {
+        let heating = crate::mechanism::mechanism("dissipation_heating").unwrap();
+        for (slot, signals) in bench.slots(heating) {
+            let (Some(x), Some(v)) = (signals.size("x"), signals.size("v")) else { panic!("{slot}") };
+            let written = heating.rewrite(&bench.simulation, &slot, &signals, Purpose::Refit).unwrap();
+            let (from, _) = written.shapes[0].told_from.unwrap();
+            assert!((from * v / (std::f64::consts::TAU * x) - 1.0).abs() < 1e-12, "{slot}: {from}");
+        }
     }
 }

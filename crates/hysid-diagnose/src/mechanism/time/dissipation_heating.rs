@@ -1,5 +1,7 @@
 //! A parameter that follows the heat of the dissipated power.
 
+use std::f64::consts::TAU;
+
 use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
 use crate::slot::Place;
 
@@ -18,6 +20,8 @@ pub static DISSIPATION_HEATING: Mechanism = Mechanism {
             .amplitude("beta", "1/v^2", -0.9, 3.0)
             .shape("tau_h", "T", Grid::Values(vec![0.05, 0.2, 0.6]))
             .within(0.01, 5.0)
+            // One period of the motion.
+            .told_from(TAU, "x/v", "what follows within one period of the motion is a law of the motion")
             .state("theta", "v^2", heat)
     },
     contains: &[],
