@@ -107,8 +107,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("scoring on the hold-out");
     let baseline = pool[0].base.document();
-    let last = modelled.as_ref().unwrap_or(best);
-    let augmented = modelled.as_ref().or((set > 0).then_some(best)).map(|h| h.base.document());
+    let kept = if set > 0 { &pool[set] } else { best };
+    let last = modelled.as_ref().unwrap_or(kept);
+    let augmented = modelled.as_ref().or((set > 0).then_some(kept)).map(|h| h.base.document());
     let before = free_run(&baseline, &held, setting.substeps);
     let after = augmented.as_ref().and_then(|a| free_run(a, &held, setting.substeps));
     if let Some(run) = &before {
@@ -221,10 +222,13 @@ fn written<'d>(
     }
     // Another recording sees another course of what wanders: what follows this one is worse than nothing there.
     let wanders = judged.wanders().filter(|_| winner > 0 && !vetoed && risk.is_none()).map(str::to_owned);
+    let steady = if wanders.is_some() { judged.steady(pool) } else { winner };
     if let Some(words) = &wanders {
-        file.notes.push(format!("{words}: that is likelier than a change that the catalogue has, and another recording sees another course, so that the effects are not written"));
+        let written =
+            if steady > 0 { "it is not written, and the other effects are" } else { "the effects are not written" };
+        file.notes.push(format!("{words}: that is likelier than a change that the catalogue has, and another recording sees another course, so that {written}"));
     }
-    let set = if winner > 0 && !vetoed && risk.is_none() && !foreign && wanders.is_none() { winner } else { 0 };
+    let set = if winner > 0 && !vetoed && risk.is_none() && !foreign { steady } else { 0 };
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {
         (hooks.progress)("writing the correction into the simulation");
         judged.rest.modelled(search, pool, winner, set)

@@ -6,7 +6,7 @@ use super::wanders::{Wanders, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
-use crate::model::hypothesis::{Effect, Hypothesis};
+use crate::model::hypothesis::{Effect, Hypothesis, Key};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::explore::Explored;
 use crate::search::leaves_more;
@@ -41,6 +41,11 @@ pub struct Judgement<'d> {
     /// The verdict.
     pub kind: VerdictKind,
 }
+
+/// Probability above which something wanders in the place of an effect rather than not.
+const LIKELY: f64 = 0.5;
+/// Share of the log evidence that the members which do not wander must bring by themselves to be written without the others.
+const STEADY: f64 = 0.5;
 
 impl<'d> Judgement<'d> {
     /// Of what a search found.
@@ -123,9 +128,21 @@ impl<'d> Judgement<'d> {
         self.within == VerdictKind::NoSignificantMismatch && self.kind == VerdictKind::Ambiguous
     }
 
+    /// The winner without the members in the place of which something wanders, as a place in the pool; the simulation as it is where the others were
+    /// not fitted or explain too little.
+    pub fn steady(&self, pool: &[Hypothesis<'_>]) -> usize {
+        let best = &pool[self.winner];
+        let stays = |w: &Option<Wanders>| w.as_ref().is_none_or(|w| w.probability <= LIKELY);
+        let members = best.effects.iter().zip(&self.wandering).filter(|(_, w)| stays(w));
+        let mut key: Key = members.map(|(e, _)| (e.mechanism.id, e.slot.label.clone())).collect();
+        key.sort();
+        let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence - pool[0].log_evidence)).collect();
+        place_of(&sets, &key, STEADY * sets[self.winner].1)
+    }
+
     /// What most likely varies in the place of a member of the winner, in words, where that is likelier than the member.
     pub fn wanders(&self) -> Option<&str> {
-        let likely = self.wandering.iter().flatten().filter(|w| w.probability > 0.5);
+        let likely = self.wandering.iter().flatten().filter(|w| w.probability > LIKELY);
         likely.max_by(|a, b| a.probability.total_cmp(&b.probability)).map(|w| w.words.as_str())
     }
 
@@ -133,6 +150,12 @@ impl<'d> Judgement<'d> {
     pub fn contest<'a>(&'a self, pool: &'a [Hypothesis<'d>]) -> Contest<'a, 'd> {
         Contest { pool, weighed: &self.weighed, probability: &self.probability, winner: self.winner }
     }
+}
+
+/// The place of the best set that makes this statement, of sets by statement and gain; the first where none gains more than the least.
+fn place_of(sets: &[(Key, f64)], key: &Key, least: f64) -> usize {
+    let found = sets.iter().enumerate().filter(|(_, (k, gain))| k == key && *gain > least);
+    found.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).map_or(0, |(i, _)| i)
 }
 
 /// What speaks against writing a set into the simulation, in words; `least` is the simulation as it is with the least error.
@@ -167,4 +190,20 @@ fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String
         Some(format!("{id}: for a firm answer the recording lacks something: {lacking}"))
     };
     best.effects.iter().map(told).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_members_that_stay_are_written_where_they_bring_enough() {
+        let key = |ids: &[&'static str]| -> Key { ids.iter().map(|id| (*id, String::new())).collect() };
+        let sets =
+            [(key(&[]), 0.0), (key(&["a"]), 55.0), (key(&["b"]), 90.0), (key(&["a"]), 60.0), (key(&["a", "b"]), 100.0)];
+        assert_eq!(place_of(&sets, &key(&["a"]), 50.0), 3);
+        assert_eq!(place_of(&sets, &key(&["a"]), 70.0), 0);
+        assert_eq!(place_of(&sets, &key(&["c"]), 50.0), 0);
+        assert_eq!(place_of(&sets, &key(&[]), 50.0), 0);
+    }
 }
