@@ -31,18 +31,21 @@ pub enum Form {
     Finer,
     /// More terms, whose places are fitted too: six plays with a spacing of their own.
     Spaced,
-    /// A memory that is empty at the first sample: the current of a drive that is switched on.
-    Empty,
+    /// A memory that is not settled at the first sample: the current of a drive that is switched on, plays that an earlier input moved.
+    Unsettled,
+    /// Such a memory, of more terms.
+    FinerUnsettled,
 }
 
 impl Purpose {
     /// What a law is fitted as, in the order in which the forms are tried.
-    pub const FITTED: [Self; 6] = [
+    pub const FITTED: [Self; 7] = [
         Self::Refit,
-        Self::Form(Form::Empty),
+        Self::Form(Form::Unsettled),
         Self::Form(Form::Smooth),
         Self::Form(Form::Few),
         Self::Form(Form::Finer),
+        Self::Form(Form::FinerUnsettled),
         Self::Form(Form::Spaced),
     ];
 }

@@ -8,7 +8,7 @@ use super::assemble::{Part, assemble};
 use super::finish::finish;
 use super::screen::rewrite_at;
 use crate::budget::Step;
-use crate::mechanism::{Law, Purpose, Role};
+use crate::mechanism::{Form, Law, Purpose, Role};
 use crate::model::Values;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
@@ -40,7 +40,11 @@ pub fn finer<'d>(
     let mut forms: Vec<Hypothesis<'d>> = Vec::new();
     for (purpose, law) in effect.mechanism.forms(&effect.slot) {
         let more = unknowns(&law) > now;
-        let worth = if more { WORTH_REFINING } else { WORTH_RECASTING };
+        let worth = match purpose {
+            Purpose::Form(Form::FinerUnsettled) => PLAIN_TO_SEE,
+            _ if more => WORTH_REFINING,
+            _ => WORTH_RECASTING,
+        };
         if purpose == effect.written.purpose || h.log_evidence < trunk.log_evidence + worth {
             continue;
         }

@@ -11,10 +11,10 @@ pub static ASYMMETRIC_HYSTERESIS: Mechanism = Mechanism {
     block: Block::Hysteresis,
     places: &[Place::Input],
     applies: anywhere,
-    already: &["max(Z - P, 0)"],
+    already: &["play(u, R)", "play(u + P, R)", "max(Z - P, 0)"],
     law: |_, purpose| {
         let plays = Plays(purpose);
-        let h = plays.sum(|r| format!("play(u, {r})"));
+        let h = plays.sum(|r| plays.play(r));
         let text = match purpose {
             // Linear in its amplitudes: the one-sided part acts on the bare input.
             Purpose::Screening => format!("{h} + a_h*max(u - u_h, 0)"),

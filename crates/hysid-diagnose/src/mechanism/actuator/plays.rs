@@ -6,11 +6,14 @@
 //! - three plays with half-widths that are shares of the input's reach;
 //! - six of them;
 //! - six whose half-widths are the multiples of one spacing that is fitted too. The initial loading curve of such an operator is made of
-//!   straight pieces, and on a sharp recording pieces that end at the wrong places show.
+//!   straight pieces, and on a sharp recording pieces that end at the wrong places show;
+//! - a density, or six plays, that an input before the recording has moved: all of them by one value from which it came, as after a
+//!   monotonic way (a recording about an operating point that was approached from rest begins so).
 //!
 //! Reference: K. Kuhnen, Eur. J. Control 9 (2003) 407-418 (equidistant thresholds); M. Al Janaideh, S. Rakheja, C.-Y. Su, Mechatronics 19
 //! (2009) 656-670 (densities that fall off); E. Della Torre, Magnetic Hysteresis, IEEE Press (1999) (normal ones).
 
+use crate::mechanism::path::with_duration;
 use crate::mechanism::{Form, Grid, Law, Purpose};
 
 /// Half-widths of a few plays as shares of half the input's range.
@@ -41,14 +44,37 @@ impl Plays {
     /// What each play weighs, and its half-width.
     fn terms(self) -> Vec<(String, String)> {
         match self.0 {
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Empty) => {
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Unsettled) => {
                 density().map(|(share, radius)| (format!("p*{share}"), radius)).collect()
             }
             Purpose::Form(Form::Spaced) => (1..=SPACED).map(|i| (format!("p_{i}"), format!("{i}*r_s"))).collect(),
-            Purpose::Form(Form::Few | Form::Finer) => {
+            Purpose::Form(Form::Few | Form::Finer | Form::FinerUnsettled) => {
                 (1..=self.radii().len()).map(|i| (format!("p_{i}"), format!("r_{i}"))).collect()
             }
         }
+    }
+
+    /// The plays of a law that always begin in the middle.
+    pub fn settled(purpose: Purpose) -> Self {
+        Self(match purpose {
+            Purpose::Form(Form::Unsettled) => Purpose::Form(Form::Smooth),
+            Purpose::Form(Form::FinerUnsettled) => Purpose::Form(Form::Finer),
+            other => other,
+        })
+    }
+
+    /// Whether the plays remember what was before the recording.
+    fn unsettled(self) -> bool {
+        matches!(self.0, Purpose::Form(Form::Unsettled | Form::FinerUnsettled))
+    }
+
+    /// A play of this half-width, as text: in the middle at the first sample, or where an input that came from `u_s` has moved it by then. The
+    /// first time is the time delayed by the whole recording.
+    pub fn play(self, radius: &str) -> String {
+        if !self.unsettled() {
+            return format!("play(u, {radius})");
+        }
+        format!("play(u + (1 - sign(t - delay(t, T_r)))*max(min(u_s - u, {radius}), -{radius}), {radius})")
     }
 
     /// The input and, for each play, its weight times what `play` makes of its half-width less the input: for large swings the gain stays
@@ -63,7 +89,7 @@ impl Plays {
         let law = Law::replace(text);
         let weight = |law: Law, i: usize| law.amplitude(format!("p_{i}"), "1", -0.2, 1.0);
         let law = match self.0 {
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Empty) => law
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Unsettled) => law
                 .amplitude("p", "1", -0.2, 5.0)
                 .shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0]))
                 .constant("r_w", "u", Grid::Reach("u", vec![1.0 / CELLS as f64])),
@@ -72,9 +98,16 @@ impl Plays {
                 "u",
                 Grid::Reach("u", [0.8, 1.0, 1.2].map(|s| s / (SPACED + 1) as f64).to_vec()),
             ),
-            Purpose::Form(Form::Few | Form::Finer) => self.radii().iter().zip(1..).fold(law, |law, (share, i)| {
-                weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
-            }),
+            Purpose::Form(Form::Few | Form::Finer | Form::FinerUnsettled) => {
+                self.radii().iter().zip(1..).fold(law, |law, (share, i)| {
+                    weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
+                })
+            }
+        };
+        let law = if self.unsettled() {
+            with_duration(law).shape("u_s", "u", Grid::Values(vec![-2.0, 0.0, 2.0])).within(-10.0, 10.0)
+        } else {
+            law
         };
         let weights: Vec<String> = self.terms().into_iter().map(|(weight, _)| weight).collect();
         law.report("share", "1", weights.join(" + "))
@@ -112,8 +145,8 @@ mod tests {
         let six = [("p_1", 0.03), ("p_2", 0.08), ("p_3", 0.02), ("p_4", 0.06), ("p_5", 0.01), ("p_6", 0.05)];
         match purpose {
             Purpose::Form(Form::Few) => six[..3].to_vec(),
-            Purpose::Form(Form::Finer) => six.to_vec(),
-            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Empty) => {
+            Purpose::Form(Form::Finer | Form::FinerUnsettled) => six.to_vec(),
+            Purpose::Screening | Purpose::Refit | Purpose::Form(Form::Smooth | Form::Unsettled) => {
                 vec![("p", 0.4), ("r_d", 4.0)]
             }
             Purpose::Form(Form::Spaced) => six.into_iter().chain([("r_s", 1.3)]).collect(),
@@ -137,6 +170,25 @@ mod tests {
                 assert!((rise - fall).abs() < 1e-9, "{purpose:?}: the loop is not closed");
             }
             assert!((rising[steps as usize] - falling[0]).abs() < 1e-9, "{purpose:?}: the loop is not closed");
+        }
+    }
+
+    /// Plays that came from somewhere answer as the settled ones do to the same input with the way from there before it.
+    #[test]
+    fn what_was_before_the_recording_is_one_value() {
+        let input: Vec<f64> = (0..200).map(|i| 5.0 + 2.0 * (0.1 * f64::from(i)).sin() + 0.01 * f64::from(i)).collect();
+        for (settled, unsettled) in [
+            (Purpose::Refit, Purpose::Form(Form::Unsettled)),
+            (Purpose::Form(Form::Finer), Purpose::Form(Form::FinerUnsettled)),
+        ] {
+            for from in [0.0, 3.0, 5.0, 6.5, 20.0] {
+                let mut set = values(unsettled);
+                set.push(("u_s", from));
+                let (found, _) = answer(unsettled, &set, &input);
+                let (expected, _) = answer(settled, &values(settled), &[&[from], &input[..]].concat());
+                let apart = found.iter().zip(&expected[1..]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-9, "{unsettled:?} from {from}: {apart}");
+            }
         }
     }
 

@@ -11,10 +11,10 @@ pub static PRANDTL_ISHLINSKII: Mechanism = Mechanism {
     block: Block::Hysteresis,
     places: &[Place::Input],
     applies: anywhere,
-    already: &["play(u, R)"],
+    already: &["play(u, R)", "play(u + P, R)"],
     law: |_, purpose| {
         let plays = Plays(purpose);
-        plays.law(plays.sum(|r| format!("play(u, {r})")))
+        plays.law(plays.sum(|r| plays.play(r)))
     },
     contains: &["backlash"],
     confusable: &["backlash", "bouc_wen", "log_creep"],

@@ -19,35 +19,36 @@ pub static PREISACH: Mechanism = Mechanism {
     block: Block::Hysteresis,
     places: &[Place::Input],
     applies: anywhere,
-    already: &["play(u, R)^P", "relay(u, P, Q)"],
+    already: &["play(u, R)", "play(u + P, R)", "relay(u, P, Q)"],
     law: |_, purpose| {
         // Preisach's model in play coordinates: a curved function of each play, which goes on as a straight line beyond what the recording
         // reached: a polynomial that runs on is no model of a hysteresis.
-        let play = |r: &str| format!("play(u, {r})");
-        let within = |r: &str| format!("max(min({}, u_m), -u_m)", play(r));
+        let within = |play: &str| format!("max(min({play}, u_m), -u_m)");
         // Each play bent on its own, to the third degree.
         if let Purpose::Form(Form::Few) = purpose {
             let plays = Plays(purpose);
             let curved = |i: usize| {
-                let r = format!("r_{i}");
-                format!(" + {}*(q_{i}*{w}/u_r + s_{i}*{w}^2/u_r^2)", play(&r), w = within(&r))
+                let play = plays.play(&format!("r_{i}"));
+                format!(" + {play}*(q_{i}*{w}/u_r + s_{i}*{w}^2/u_r^2)", w = within(&play))
             };
             let bent: String = (1..=PLAYS).map(curved).collect();
-            let law = scaled(plays.law(format!("{}{bent}", plays.sum(play))));
+            let law = scaled(plays.law(format!("{}{bent}", plays.sum(|r| plays.play(r)))));
             return (1..=PLAYS).fold(law, |law, i| {
                 law.amplitude(format!("q_{i}"), "1", -1.0, 1.0).amplitude(format!("s_{i}"), "1", -1.0, 1.0)
             });
         }
         // Alike for all plays: the density is a product of a function of the half-width and one of the level.
-        let plays = Plays(Purpose::Refit);
+        let unsettled = Purpose::Form(Form::Unsettled);
+        let plays = Plays(if purpose == unsettled { unsettled } else { Purpose::Refit });
         let square = purpose == Purpose::Form(Form::Finer);
         let curved = |(share, r): (String, String)| {
-            let (play, w) = (play(&r), within(&r));
+            let play = plays.play(&r);
+            let w = within(&play);
             let second = if square { format!(" + s*{share}*{play}*{w}^2/u_r^2") } else { String::new() };
             format!(" + q*{share}*{play}*{w}/u_r{second}")
         };
         let bent: String = density().map(curved).collect();
-        let law = scaled(plays.law(format!("{}{bent}", plays.sum(play)))).amplitude("q", "1", -5.0, 5.0);
+        let law = scaled(plays.law(format!("{}{bent}", plays.sum(|r| plays.play(r))))).amplitude("q", "1", -5.0, 5.0);
         if square { law.amplitude("s", "1", -5.0, 5.0) } else { law }
     },
     contains: &["prandtl_ishlinskii", "backlash"],

@@ -11,12 +11,12 @@ pub static RATE_DEPENDENT_HYSTERESIS: Mechanism = Mechanism {
     block: Block::Hysteresis,
     places: &[Place::Input],
     applies: anywhere,
-    already: &["lag(play(u, R), P)"],
+    already: &["play(u, R)", "play(u + P, R)"],
     law: |_, purpose| {
         // Plays in series with a lag do to first order what thresholds that grow with the rate do, each play by a lag of its own where they
         // grow in proportion; only sharp recordings tell the difference. The rate is that of the way from the sample before: a central
         // difference is nearly blind to what turns at every sample, and such inputs widen the loop most.
-        let plays = Plays(purpose);
+        let plays = Plays::settled(purpose);
         let wide = |r: &str| format!("play(u, {r}*(1 + lambda*abs(u - delay(u, h_u))/h_u))");
         match purpose {
             Purpose::Screening | Purpose::Refit => plays

@@ -37,7 +37,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
             .starting_free()
             .never_baseline(),
         // The same within a sampling period, where a state of its own would need shorter steps.
-        Purpose::Form(Form::Empty) => {
+        Purpose::Form(Form::Unsettled) => {
             wound(with_duration(Law::replace(format!("lag(u - k_e*v, tau_e) - {}", emptiness("u", "tau_e")))))
         }
         Purpose::Refit | Purpose::Form(_) => wound(Law::replace("lag(u - k_e*v, tau_e)")),

@@ -35,7 +35,7 @@ fn first_order(signal: &str, purpose: Purpose) -> Law {
         Purpose::Form(Form::Finer) => {
             Law::replace("s_l").state("s_l", signal, format!("({signal} - s_l)/tau")).starting_free()
         }
-        Purpose::Form(Form::Empty) => {
+        Purpose::Form(Form::Unsettled) => {
             with_duration(Law::replace(format!("lag({signal}, tau) - {}", emptiness(signal, "tau"))))
         }
         Purpose::Refit | Purpose::Form(_) => Law::replace(format!("lag({signal}, tau)")),

@@ -10,7 +10,7 @@ pub static BACKLASH: Mechanism = Mechanism {
     block: Block::Hysteresis,
     places: &[Place::Input, Place::Between, Place::Sensor, Place::Connection],
     applies: |slot| slot.place != Place::Connection || slot.has("k"),
-    already: &["play(u, R)", "play(y, R)", "max(min(x, P), Q)"],
+    already: &["play(u, R)", "play(u + P, R)", "play(y, R)", "max(min(x, P), Q)"],
     law: |slot, purpose| {
         let signal = match slot.place {
             Place::Input | Place::Between => "u",
