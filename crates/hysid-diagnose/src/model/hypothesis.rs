@@ -55,6 +55,13 @@ impl Hypothesis<'_> {
         key
     }
 
+    /// Whether two of its effects are sums of the same elements at one place: together they are one such sum.
+    pub fn repeats_itself(&self) -> bool {
+        let sum = |e: &Effect| e.mechanism.family.members_imitate();
+        let alike = |a: &Effect, b: &Effect| a.mechanism.family == b.mechanism.family && a.slot.label == b.slot.label;
+        self.effects.iter().enumerate().any(|(i, a)| sum(a) && self.effects[..i].iter().any(|b| alike(a, b)))
+    }
+
     /// The families of its effects, sorted.
     pub fn families(&self) -> Vec<&'static str> {
         let mut all: Vec<&str> = self.effects.iter().map(|e| e.mechanism.family.name()).collect();

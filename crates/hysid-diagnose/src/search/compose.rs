@@ -321,8 +321,11 @@ fn extended<'d>(
     refit_all(setting, parent, &list)
 }
 
-/// Adds a hypothesis, or replaces the same statement with less evidence.
+/// Adds a hypothesis, or replaces the same statement with less evidence; not one that states the same law twice.
 pub fn add<'d>(pool: &mut Vec<Hypothesis<'d>>, h: Hypothesis<'d>) {
+    if h.repeats_itself() {
+        return;
+    }
     let key = h.key();
     match pool.iter_mut().find(|p| p.key() == key) {
         Some(same) => {

@@ -79,6 +79,10 @@ pub fn pairs(candidates: &[Candidate], r: &[f64], most: usize) -> Vec<Pair> {
         }
         // Siblings of a pair that is there already are left to the swaps.
         let kind = |m: usize| (candidates[m].mechanism.family, candidates[m].slot.label.as_str());
+        // Two sums of plays at one input are one.
+        if kind(members[0]) == kind(members[1]) && kind(members[0]).0.members_imitate() {
+            continue;
+        }
         let alike = out.iter().filter(|p| p.members.map(kind) == members.map(kind)).count();
         if alike >= 2 {
             continue;
