@@ -221,14 +221,15 @@ fn written<'d>(
         file.notes.push(format!("on the recorded inputs mirrored and reversed in time the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): no augmented simulation is written, since it may be worse than nothing there", number(share)));
     }
     // Another recording sees another course of what wanders: what follows this one is worse than nothing there.
-    let wanders = judged.wanders().filter(|_| winner > 0 && !vetoed && risk.is_none()).map(str::to_owned);
+    let believed = winner > 0 && !vetoed && risk.is_none();
+    let wanders = judged.wanders().filter(|_| believed);
     let steady = if wanders.is_some() { judged.steady(pool) } else { winner };
-    if let Some(words) = &wanders {
+    let set = if believed && !foreign { steady } else { 0 };
+    if let Some(words) = wanders {
         let written =
-            if steady > 0 { "it is not written, and the other effects are" } else { "the effects are not written" };
+            if set > 0 { "it is not written, and the other effects are" } else { "the effects are not written" };
         file.notes.push(format!("{words}: that is likelier than a change that the catalogue has, and another recording sees another course, so that {written}"));
     }
-    let set = if winner > 0 && !vetoed && risk.is_none() && !foreign { steady } else { 0 };
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {
         (hooks.progress)("writing the correction into the simulation");
         judged.rest.modelled(search, pool, winner, set)

@@ -8,7 +8,14 @@ use crate::model::{Model, Values};
 use crate::request::Request;
 
 /// Error (rms), over that of the calibration, at which a fit under a noise model has given up explaining.
-pub const WORSE: f64 = 1.05;
+const WORSE: f64 = 1.05;
+
+/// Whether a fit under a noise model has not given up explaining what another one explains. Noise of any colour may not explain what the simulation
+/// can. Where it is a force through the plant the plain squares are no judge: parameters follow its slow wander, and an effect that is fitted under
+/// the noise would win by undoing that.
+pub fn explains_no_less(fit: &Base<'_>, than: &Base<'_>) -> bool {
+    fit.driven() || fit.unexplained() < WORSE.powi(2) * than.unexplained()
+}
 
 /// The user's simulation, calibrated fairly: from the user's values and, where that is not enough, from others within the bounds.
 pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result<Base<'d>, DiagnoseError> {
@@ -40,14 +47,7 @@ pub fn calibrate<'d>(setting: &mut Setting<'d>, request: &Request<'_>) -> Result
     // Under its own noise, twice.
     let polished = setting.further(&best, Some(&best.whitener), 2, 20);
     Ok(match polished {
-        // Noise of any colour may not explain what the simulation can. Where it is a force through the plant the plain squares are no judge:
-        // parameters follow its slow wander, and an effect that is fitted under the noise would win by undoing that.
-        Some(p)
-            if p.log_likelihood > best.log_likelihood
-                && (p.driven() || p.unexplained() < WORSE.powi(2) * best.unexplained()) =>
-        {
-            p
-        }
+        Some(p) if p.log_likelihood > best.log_likelihood && explains_no_less(&p, &best) => p,
         _ => best,
     })
 }

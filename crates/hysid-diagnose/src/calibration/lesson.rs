@@ -5,7 +5,7 @@
 //! whole gain for itself. Steps are chosen for the simulation without effects: a lag within a sampling period, a stop or an elastic contact asks
 //! for shorter ones, and the set with the smallest error of integration would win and not the true one.
 
-use super::fair::WORSE;
+use super::fair::explains_no_less;
 use super::global::MOST_SUBSTEPS;
 use crate::evidence::norm2;
 use crate::model::Model;
@@ -131,7 +131,7 @@ pub fn lesson<'d>(
 /// The simulation without effects, fitted from where its parameters are beside those of a set; `None` where that leaves a much larger plain error.
 fn returned<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, h: &Hypothesis<'d>) -> Option<Base<'d>> {
     let b = setting.fit(&setting.original, &h.base.values(), Some(&none.base.whitener), 2, 20)?;
-    (b.driven() || b.unexplained() < WORSE.powi(2) * none.base.unexplained()).then_some(b)
+    explains_no_less(&b, &none.base).then_some(b)
 }
 
 /// Integration steps in each sampling period that a fitted set needs: as many as leave no error that could decide between two sets.

@@ -228,7 +228,7 @@ impl NoiseModel {
         self.below.whiten(out);
     }
 
-    /// Takes out of a residual what its mean has more than white noise as high as the first line would give it.
+    /// Scales the mean of a residual down to what it would be if the noise did not rise below the lowest line.
     pub fn discount_mean(&self, e: &mut [f64]) {
         self.below.whiten(e);
     }

@@ -157,7 +157,7 @@ pub fn check_form(
                 .iter()
                 .map(|r| Value { name: r.name.clone(), value: 1.0, unit: r.unit.clone() })
                 .collect();
-            for named in placeholders(mechanism.sentence) {
+            for named in placeholders(mechanism.sentence, false) {
                 if named != "place" && named != "parameter" && !values.iter().any(|v| v.name == named) {
                     breach(format!("the sentence names {named}, which is not reported"));
                 }
@@ -172,9 +172,9 @@ pub fn check_form(
     breaches
 }
 
-/// The values that a sentence names whatever the form: not those in brackets.
-fn placeholders(sentence: &str) -> Vec<&str> {
-    let parts = sentence.split(['[', ']']).enumerate().filter(|(i, _)| i % 2 == 0);
+/// The values that a sentence names: whatever the form is, or those in brackets, which some forms have.
+fn placeholders(sentence: &str, in_brackets: bool) -> Vec<&str> {
+    let parts = sentence.split(['[', ']']).enumerate().filter(|(i, _)| (i % 2 == 1) == in_brackets);
     let named = parts.flat_map(|(_, part)| part.split('{').skip(1));
     named.filter_map(|part| part.split_once('}').map(|(name, _)| name)).collect()
 }

@@ -41,25 +41,34 @@ pub struct Hypothesis<'d> {
 /// Names of a set, sorted: two hypotheses with the same key are the same statement.
 pub type Key = Vec<(&'static str, String)>;
 
+/// Whether two effects are sums of the same elements at one place: together they are one such sum.
+pub fn are_one_sum(a: (&Mechanism, &Slot), b: (&Mechanism, &Slot)) -> bool {
+    a.0.family.members_imitate() && a.0.family == b.0.family && a.1.label == b.1.label
+}
+
 impl Hypothesis<'_> {
     /// The statement that it makes.
     pub fn key(&self) -> Key {
-        self.key_without(usize::MAX)
+        self.key_of(|_| true)
     }
 
     /// The statement without this one of its effects.
     pub fn key_without(&self, member: usize) -> Key {
-        let others = self.effects.iter().enumerate().filter(|(i, _)| *i != member);
-        let mut key: Key = others.map(|(_, e)| (e.mechanism.id, e.slot.label.clone())).collect();
+        self.key_of(|i| i != member)
+    }
+
+    /// The statement of those of its effects that stay.
+    pub fn key_of(&self, stays: impl Fn(usize) -> bool) -> Key {
+        let members = self.effects.iter().enumerate().filter(|(i, _)| stays(*i));
+        let mut key: Key = members.map(|(_, e)| (e.mechanism.id, e.slot.label.clone())).collect();
         key.sort();
         key
     }
 
-    /// Whether two of its effects are sums of the same elements at one place: together they are one such sum.
+    /// Whether two of its effects are one sum.
     pub fn repeats_itself(&self) -> bool {
-        let sum = |e: &Effect| e.mechanism.family.members_imitate();
-        let alike = |a: &Effect, b: &Effect| a.mechanism.family == b.mechanism.family && a.slot.label == b.slot.label;
-        self.effects.iter().enumerate().any(|(i, a)| sum(a) && self.effects[..i].iter().any(|b| alike(a, b)))
+        let one = |a: &Effect, b: &Effect| are_one_sum((a.mechanism, &a.slot), (b.mechanism, &b.slot));
+        self.effects.iter().enumerate().any(|(i, a)| self.effects[..i].iter().any(|b| one(a, b)))
     }
 
     /// The families of its effects, sorted.

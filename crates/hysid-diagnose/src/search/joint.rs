@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::screen::Candidate;
 use crate::evidence::{FeatureGroup, dot, norm2, score};
+use crate::model::hypothesis::are_one_sum;
 
 /// Candidates of which all pairs are compared.
 const MOST: usize = 40;
@@ -79,8 +80,8 @@ pub fn pairs(candidates: &[Candidate], r: &[f64], most: usize) -> Vec<Pair> {
         }
         // Siblings of a pair that is there already are left to the swaps.
         let kind = |m: usize| (candidates[m].mechanism.family, candidates[m].slot.label.as_str());
-        // Two sums of plays at one input are one.
-        if kind(members[0]) == kind(members[1]) && kind(members[0]).0.members_imitate() {
+        let [first, second] = members.map(|m| (candidates[m].mechanism, &candidates[m].slot));
+        if are_one_sum(first, second) {
             continue;
         }
         let alike = out.iter().filter(|p| p.members.map(kind) == members.map(kind)).count();

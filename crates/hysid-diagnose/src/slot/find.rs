@@ -126,10 +126,7 @@ impl Finder<'_> {
             slot.context = self.equations();
             let driven = self.motions.iter().find(|m| m.derivative.uses(symbol));
             if let Some(motion) = driven {
-                slot.offer(self.simulation, "v", Expr::symbol(motion.v));
-                if let Some(x) = motion.x {
-                    slot.offer(self.simulation, "x", Expr::symbol(x));
-                }
+                self.offer_motion(&mut slot, motion);
             } else if let Some((current, motion)) = self.winding(symbol) {
                 slot.offer(self.simulation, "i", Expr::symbol(current));
                 slot.offer(self.simulation, "v", Expr::symbol(motion.v));
@@ -230,6 +227,14 @@ impl Finder<'_> {
         shares.all(|s| s.as_ref() == Some(&first)).then_some(first)
     }
 
+    /// Offers the velocity of a part and, where it has one, its displacement.
+    fn offer_motion(&self, slot: &mut Slot, motion: &Motion<'_>) {
+        slot.offer(self.simulation, "v", Expr::symbol(motion.v));
+        if let Some(x) = motion.x {
+            slot.offer(self.simulation, "x", Expr::symbol(x));
+        }
+    }
+
     /// The current of a winding that an input drives, and the motion that it moves; `None` where the winding feels the speed already.
     fn winding(&self, input: &str) -> Option<(&str, &Motion<'_>)> {
         let current = |s: &&State| self.simulation.unit_of(&s.name).is_none_or(|u| is_one_of(&u, &["A"]));
@@ -320,10 +325,7 @@ impl Finder<'_> {
             }
             let moved = self.motions.iter().find(|m| m.derivative.uses(name)).or(self.motions.first());
             if let Some(motion) = moved {
-                slot.offer(self.simulation, "v", Expr::symbol(motion.v));
-                if let Some(x) = motion.x {
-                    slot.offer(self.simulation, "x", Expr::symbol(x));
-                }
+                self.offer_motion(&mut slot, motion);
             } else if let Some(law) = self.force_laws().first() {
                 for symbol in ["v", "x"] {
                     if let Some(q) = law.quantity(symbol) {

@@ -132,10 +132,7 @@ impl<'d> Judgement<'d> {
     /// not fitted or explain too little.
     pub fn steady(&self, pool: &[Hypothesis<'_>]) -> usize {
         let best = &pool[self.winner];
-        let stays = |w: &Option<Wanders>| w.as_ref().is_none_or(|w| w.probability <= LIKELY);
-        let members = best.effects.iter().zip(&self.wandering).filter(|(_, w)| stays(w));
-        let mut key: Key = members.map(|(e, _)| (e.mechanism.id, e.slot.label.clone())).collect();
-        key.sort();
+        let key = best.key_of(|i| self.wandering[i].as_ref().is_none_or(|w| w.probability <= LIKELY));
         let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence - pool[0].log_evidence)).collect();
         place_of(&sets, &key, STEADY * sets[self.winner].1)
     }

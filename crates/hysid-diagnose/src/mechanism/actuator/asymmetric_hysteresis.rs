@@ -14,7 +14,7 @@ pub static ASYMMETRIC_HYSTERESIS: Mechanism = Mechanism {
     already: &["play(u, R)", "play(u + P, R)", "max(Z - P, 0)"],
     law: |_, purpose| {
         let plays = Plays(purpose);
-        let h = plays.sum(|r| plays.play(r));
+        let h = plays.simply();
         let text = match purpose {
             // Linear in its amplitudes: the one-sided part acts on the bare input.
             Purpose::Screening => format!("{h} + a_h*max(u - u_h, 0)"),

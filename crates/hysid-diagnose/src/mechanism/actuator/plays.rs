@@ -84,6 +84,11 @@ impl Plays {
         format!("u{}", self.terms().into_iter().map(part).collect::<String>())
     }
 
+    /// [`Plays::sum`] of the plays as they are.
+    pub fn simply(self) -> String {
+        self.sum(|r| self.play(r))
+    }
+
     /// A law that puts this text in the place of the input, with the parameters that [`Plays::sum`] names.
     pub fn law(self, text: impl Into<String>) -> Law {
         let law = Law::replace(text);

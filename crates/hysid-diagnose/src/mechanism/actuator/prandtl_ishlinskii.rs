@@ -14,7 +14,7 @@ pub static PRANDTL_ISHLINSKII: Mechanism = Mechanism {
     already: &["play(u, R)", "play(u + P, R)"],
     law: |_, purpose| {
         let plays = Plays(purpose);
-        plays.law(plays.sum(|r| plays.play(r)))
+        plays.law(plays.simply())
     },
     contains: &["backlash"],
     confusable: &["backlash", "bouc_wen", "log_creep"],

@@ -32,7 +32,7 @@ pub static PREISACH: Mechanism = Mechanism {
                 format!(" + {play}*(q_{i}*{w}/u_r + s_{i}*{w}^2/u_r^2)", w = within(&play))
             };
             let bent: String = (1..=PLAYS).map(curved).collect();
-            let law = scaled(plays.law(format!("{}{bent}", plays.sum(|r| plays.play(r)))));
+            let law = scaled(plays.law(format!("{}{bent}", plays.simply())));
             return (1..=PLAYS).fold(law, |law, i| {
                 law.amplitude(format!("q_{i}"), "1", -1.0, 1.0).amplitude(format!("s_{i}"), "1", -1.0, 1.0)
             });
@@ -48,7 +48,7 @@ pub static PREISACH: Mechanism = Mechanism {
             format!(" + q*{share}*{play}*{w}/u_r{second}")
         };
         let bent: String = density().map(curved).collect();
-        let law = scaled(plays.law(format!("{}{bent}", plays.sum(|r| plays.play(r))))).amplitude("q", "1", -5.0, 5.0);
+        let law = scaled(plays.law(format!("{}{bent}", plays.simply()))).amplitude("q", "1", -5.0, 5.0);
         if square { law.amplitude("s", "1", -5.0, 5.0) } else { law }
     },
     contains: &["prandtl_ishlinskii", "backlash"],

@@ -14,11 +14,25 @@ fn every_specimen_can_be_read() {
 #[test]
 fn every_mechanism_stands_somewhere_and_keeps_the_form() {
     let mut stands: Vec<&str> = vec!["solver_artefact"];
+    let mut told: Vec<(&str, String)> = Vec::new();
     let mut breaches = Vec::new();
     for simulation in specimens() {
         let structure = Structure::of(&simulation);
         stands.extend(catalogue().iter().filter(|m| !m.slots(&structure).is_empty()).map(|m| m.id));
         breaches.extend(check_simulation(&simulation));
+        for m in catalogue() {
+            for slot in m.slots(&structure) {
+                let signals = example_signals(&simulation, &slot);
+                let written = m.rewrite(&simulation, &slot, &signals, Purpose::Refit).unwrap();
+                told.extend(written.report.into_iter().map(|r| (m.id, r.name)));
+            }
+        }
+    }
+    // What stands in brackets the plain form has, at one slot at least.
+    for m in catalogue() {
+        for name in placeholders(m.sentence, true) {
+            assert!(told.contains(&(m.id, name.to_owned())), "{}: no plain form tells {name}", m.id);
+        }
     }
     let shown: Vec<String> = breaches.iter().map(|b| format!("{}: {}: {}", b.mechanism, b.at, b.what)).collect();
     assert!(shown.is_empty(), "{} breaches:\n{}", shown.len(), shown.join("\n"));
@@ -203,6 +217,7 @@ fn what_is_held_or_wound_beside_a_motion_is_found() {
 /// Heat that follows within a period of the motion is told from there on, in seconds.
 #[test]
 fn the_period_of_the_motion_is_the_least_time_constant_of_heat() {
+    let mut seen = 0;
     for bench in benches().iter().filter(|b| b.simulation.state("v").is_some() && b.simulation.state("x").is_some()) {
         let heating = crate::mechanism::mechanism("dissipation_heating").unwrap();
         for (slot, signals) in bench.slots(heating) {
@@ -210,6 +225,8 @@ fn the_period_of_the_motion_is_the_least_time_constant_of_heat() {
             let written = heating.rewrite(&bench.simulation, &slot, &signals, Purpose::Refit).unwrap();
             let (from, _) = written.shapes[0].told_from.unwrap();
             assert!((from * v / (std::f64::consts::TAU * x) - 1.0).abs() < 1e-12, "{slot}: {from}");
+            seen += 1;
         }
     }
+    assert!(seen > 0);
 }
