@@ -25,6 +25,7 @@ use crate::search::explore::{Explored, LESSONS, explore};
 use crate::text::number;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
+use crate::verdict::trifles::Trifle;
 
 /// The outcome of a diagnosis.
 #[derive(Debug, Clone)]
@@ -190,6 +191,7 @@ fn statement(
             file.experiment = separating(setting, &contest, &mut file.alternatives, seed, hooks.expired);
         }
     }
+    file.notes.extend(judged.trifles.iter().map(Trifle::words));
     if let Some(why) = judged.veto {
         file.notes.push(format!("{why}, and no augmented simulation is written"));
     }

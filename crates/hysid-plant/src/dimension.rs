@@ -12,8 +12,7 @@ fn unit_of(simulation: &Simulation, expr: &Expr) -> Result<Option<Unit>, String>
     let unit = |e: &Expr| unit_of(simulation, e);
     match expr {
         Expr::Number(_) => Ok(None),
-        Expr::Symbol(name) if simulation.input(name).is_some() => Ok(None),
-        Expr::Symbol(name) => Ok(simulation.unit_of(name)),
+        Expr::Symbol(name) => Ok(simulation.declared_unit(name)),
         Expr::Neg(a) => unit(a),
         Expr::Binary(op, a, b) => {
             let (left, right) = (unit(a)?, unit(b)?);
@@ -135,10 +134,11 @@ impl Simulation {
         first_clash(self).is_none()
     }
 
-    /// The unit of an expression over this simulation's symbols, where the declared units settle it; inputs count with the
-    /// unit that their column's name ends in.
+    /// The unit of an expression over this simulation's symbols, where the declared units settle it; inputs, and states of which nothing is declared,
+    /// count with the unit that their column's name ends in.
     pub fn unit_of_expr(&self, expr: &Expr) -> Option<Unit> {
         let mut with_columns = self.clone();
+        with_columns.states.iter_mut().for_each(|s| s.unit = self.unit_of(&s.name));
         // A parameter in the place of each input carries the unit of its column's name.
         let inputs = std::mem::take(&mut with_columns.inputs);
         for input in inputs {

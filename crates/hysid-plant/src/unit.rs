@@ -235,19 +235,32 @@ impl Display for Unit {
 }
 
 impl Unit {
-    /// The unit that a column's name ends in: `force_N` gives `N`, `v_mm_s` gives `mm/s`, `inflow_m3_s` gives `m^3/s`; nothing where the end is
-    /// not known.
+    /// The unit that a column's name ends in: `force_N` gives `N`, `v_mm_s` gives `mm/s`, `inflow_m3_s` gives `m^3/s`, `conc_mol_L` gives `mol/L`;
+    /// nothing where the end is not known or may be read in two ways (`torque_N_m`, `H_A_m`).
     pub fn of_column(column: &str) -> Option<Self> {
         let parts: Vec<&str> = column.split('_').skip(1).collect();
         let (&last, before) = parts.split_last()?;
+        let quotient = |(above, power): (&str, i32), (below, per): (&str, i32)| Self {
+            factors: vec![(above.to_owned(), 2 * power), (below.to_owned(), -2 * per)],
+        };
+        let above = before.last().copied().unwrap_or_default();
         // A time after a unit divides by it; alone it is a time.
-        let per = match last {
+        let time = match last {
             "s" | "min" | "h" => Some((last, 1)),
             "s2" => Some(("s", 2)),
             _ => None,
         };
-        if let (Some((time, power)), Some((name, exponent))) = (per, before.last().and_then(|n| powered(n))) {
-            return Some(Self { factors: vec![(name.to_owned(), 2 * exponent), (time.to_owned(), -2 * power)] });
+        if let Some((above, time)) = powered(above).zip(time) {
+            return Some(quotient(above, time));
+        }
+        match (above, powered(last)) {
+            ("mol", Some(below)) => return Some(quotient((above, 1), below)),
+            // One letter may be the name of a part as well as a unit.
+            ("A" | "V" | "W" | "N" | "J", Some(_)) => return None,
+            (_, Some(below)) if above.len() > 1 && exponents(above).is_some() => {
+                return Some(quotient((above, 1), below));
+            }
+            _ => {}
         }
         // `x_m2` is more likely the place of a second mass than an area.
         exponents(last).map(|_| Self { factors: vec![(last.to_owned(), 2)] })

@@ -85,15 +85,25 @@ fn units_multiply_and_compare() {
     assert!(unit("N s/(cm V)").same_dimension(&unit("N s/mm").per(&unit("V"))));
     assert!(unit("rad/s").same_dimension(&unit("1/s")));
     assert!(!unit("N").same_dimension(&unit("N m")));
-    assert_eq!(Unit::of_column("v_cm_s").map(|u| u.to_string()).as_deref(), Some("cm/s"));
-    assert_eq!(Unit::of_column("force_N").map(|u| u.to_string()).as_deref(), Some("N"));
-    assert_eq!(Unit::of_column("inflow_m3_s").map(|u| u.to_string()).as_deref(), Some("m^3/s"));
-    assert_eq!(Unit::of_column("flow_L_min").map(|u| u.to_string()).as_deref(), Some("L/min"));
-    assert_eq!(Unit::of_column("a_m_s2").map(|u| u.to_string()).as_deref(), Some("m/s^2"));
-    assert_eq!(Unit::of_column("t_s").map(|u| u.to_string()).as_deref(), Some("s"));
-    assert_eq!(Unit::of_column("rest_min").map(|u| u.to_string()).as_deref(), Some("min"));
-    assert_eq!(Unit::of_column("x_m2"), None);
-    assert_eq!(Unit::of_column("valve"), None);
+    for (column, expected) in [
+        ("v_cm_s", Some("cm/s")),
+        ("force_N", Some("N")),
+        ("inflow_m3_s", Some("m^3/s")),
+        ("flow_L_min", Some("L/min")),
+        ("a_m_s2", Some("m/s^2")),
+        ("t_s", Some("s")),
+        ("rest_min", Some("min")),
+        ("conc_mol_L", Some("mol/L")),
+        ("density_kg_m3", Some("kg/m^3")),
+        ("stroke_mm_V", Some("mm/V")),
+        ("level_h_m", Some("m")),
+        ("torque_N_m", None),
+        ("H_A_m", None),
+        ("x_m2", None),
+        ("valve", None),
+    ] {
+        assert_eq!(Unit::of_column(column).map(|u| u.to_string()).as_deref(), expected, "{column}");
+    }
     // A flow through a hole goes with the root of the level.
     for torricelli in ["cm^0.5/s", "cm^2.5/s", "1/m^1.5", "N.m^2.5"] {
         let twice = unit(torricelli).power(2);

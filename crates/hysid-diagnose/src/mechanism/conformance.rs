@@ -39,7 +39,8 @@ specimens!(
     "controlled_damper",
     "stalling_wing",
     "cylinder",
-    "shaker"
+    "shaker",
+    "shaft"
 );
 
 /// A breach of the suite's laws.
@@ -209,6 +210,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.01, 16.0),
     (0.002, 100.0),
     (0.0004, 10.0),
+    (0.01, 1.0),
 ];
 
 /// A bench for each specimen.

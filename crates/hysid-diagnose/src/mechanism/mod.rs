@@ -10,6 +10,7 @@
 //! its file beside its family, list it in [`catalogue`], run the conformance suite ([`conformance`]).
 
 pub mod conformance;
+mod copies;
 mod excitation;
 mod family;
 mod grid;

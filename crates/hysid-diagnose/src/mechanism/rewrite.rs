@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use hysid_plant::{Expr, Initial, Output, Parameter, Simulation, State, Unit};
 
+use super::copies::follow;
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
 use super::{Change, Law, Mechanism, Purpose, Role, Start};
@@ -90,6 +91,15 @@ fn sensors<'s>(
     simulation.outputs.iter_mut().filter_map(move |o| times(o).map(|times| (o, times)))
 }
 
+/// Gives a state another derivative, and to whatever else holds the old one. The outputs that measure it have been seen to.
+fn derive(simulation: &mut Simulation, slot: &Slot, name: &str, before: &Expr, after: Expr) {
+    let seen: Vec<&str> = slot.sensed.iter().filter(|s| s.state == name).map(|s| s.column.as_str()).collect();
+    follow(simulation, name, before, &after, &seen);
+    if let Some(state) = simulation.state_mut(name) {
+        state.derivative = after;
+    }
+}
+
 /// The law's text at its target.
 fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Writer<'_>) -> Result<(), String> {
     match (&slot.target, change) {
@@ -143,9 +153,7 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
                 for (output, times) in sensors(simulation, slot, name) {
                     output.expression = joined(output.expression.clone(), &(Expr::Number(times) * rate.clone()));
                 }
-                if let Some(state) = simulation.state_mut(name) {
-                    state.derivative = written;
-                }
+                derive(simulation, slot, name, &derivative, written);
             }
             Ok(())
         }
@@ -168,9 +176,7 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
                     let change = Expr::Number(times) * (written.clone() - derivative.clone());
                     output.expression = output.expression.clone() + change;
                 }
-                if let Some(state) = simulation.state_mut(name) {
-                    state.derivative = written;
-                }
+                derive(simulation, slot, name, &derivative, written);
             }
             Ok(())
         }

@@ -79,6 +79,17 @@ impl Hypothesis<'_> {
     }
 }
 
+/// The place of the set with the most evidence among those of a pool that make a statement.
+pub fn best_that_says(pool: &[Hypothesis<'_>], key: &Key) -> Option<usize> {
+    let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence)).collect();
+    best_place(&sets, key)
+}
+
+/// The same of sets by statement and evidence.
+fn best_place(sets: &[(Key, f64)], key: &Key) -> Option<usize> {
+    (0..sets.len()).filter(|&i| sets[i].0 == *key).max_by(|&a, &b| sets[a].1.total_cmp(&sets[b].1))
+}
+
 /// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest: log likelihood of the blocks, each row for
 /// the share that it has in the fit, and each row's square (in units of its output's scale) for the standard error of a difference.
 pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Vec<f64>)> {
@@ -193,4 +204,19 @@ pub fn calibrated<'d>(
     setting.own_unknowns = base.model.count();
     let none = setting.hypothesis(Vec::new(), base);
     (setting, none)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_set_that_makes_a_statement_is_found() {
+        let key = |ids: &[&'static str]| -> Key { ids.iter().map(|id| (*id, String::new())).collect() };
+        let sets =
+            [(key(&[]), 0.0), (key(&["a"]), 55.0), (key(&["b"]), 90.0), (key(&["a"]), 60.0), (key(&["a", "b"]), 100.0)];
+        assert_eq!(best_place(&sets, &key(&["a"])), Some(3));
+        assert_eq!(best_place(&sets, &key(&["a", "b"])), Some(4));
+        assert_eq!(best_place(&sets, &key(&["c"])), None);
+    }
 }

@@ -58,7 +58,7 @@ fn is_one_of(unit: &Unit, names: &[&str]) -> bool {
 /// Looks for the slots of each kind.
 pub(super) struct Finder<'a> {
     pub simulation: &'a Simulation,
-    original: &'a Simulation,
+    pub original: &'a Simulation,
     pub motions: Vec<Motion<'a>>,
 }
 

@@ -1,6 +1,6 @@
 //! The slots at which forces stand: on a moving part, between two of them, at the output of a static force law.
 
-use hysid_plant::Expr;
+use hysid_plant::{BinaryOp, Expr, State};
 
 use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, size};
 use super::find::Finder;
@@ -80,43 +80,67 @@ impl Finder<'_> {
                     (Some(a), Some(b)) => a.same_dimension(b),
                     _ => true,
                 };
-                if !(alike && one.derivative.uses(x2) && other.derivative.uses(x1)) {
-                    continue;
+                if alike && one.derivative.uses(x2) && other.derivative.uses(x1) {
+                    let x = Expr::symbol(x1) - Expr::symbol(x2);
+                    slots.push(self.connection(one, other, x, (x2, 1.0), format!("between {x1} and {x2}")));
                 }
-                let target = Target::Derivatives(vec![(one.v.to_owned(), 1.0), (other.v.to_owned(), -1.0)]);
-                let mut slot =
-                    Slot::new(Place::Connection, format!("state:{}", one.v), format!("between {x1} and {x2}"), target);
-                let v = Expr::symbol(one.v) - Expr::symbol(other.v);
-                slot.loops = self.loops(&v);
-                slot.offer(self.simulation, "x", Expr::symbol(x1) - Expr::symbol(x2));
-                slot.offer(self.simulation, "v", v);
-                let force = match force_path(self.simulation, one.derivative) {
-                    ForcePath::Quotient(force, _) => force,
-                    _ => one.derivative,
-                };
-                let divided = match force_path(self.simulation, one.derivative) {
-                    ForcePath::Divided(mass) => Some(mass.clone()),
-                    _ => None,
-                };
-                let whole = |e: Expr| match &divided {
-                    Some(mass) => (mass.clone() * e).simplified(),
-                    None => e,
-                };
-                let coupling = force.terms().into_iter().filter(|(_, t)| t.uses(x2) || t.uses(other.v));
-                if let Some(size) = coupling.map(|(_, t)| t.clone().abs()).reduce(|a, b| a + b) {
-                    slot.offer(self.simulation, "F", whole(size));
-                }
-                if let Some(k) = linear_coefficient(self.simulation, force, x2) {
-                    slot.offer(self.simulation, "k", whole(k));
-                }
-                if let Some(c) = linear_coefficient(self.simulation, force, other.v) {
-                    slot.offer(self.simulation, "c", whole(c));
-                }
-                slot.context = vec![one.derivative.clone()];
-                slots.push(slot);
             }
         }
+        slots.extend(self.twists());
         slots
+    }
+
+    /// Connections whose deflection is a state of its own, the velocity of one part less that of another: a shaft's twist.
+    fn twists(&self) -> Vec<Slot> {
+        let motion = |e: &Expr| self.motions.iter().find(|m| matches!(e, Expr::Symbol(s) if s == m.v));
+        let twist = |state: &State| {
+            let Expr::Binary(BinaryOp::Sub, a, b) = &state.derivative else { return None };
+            let (one, other) = (motion(a)?, motion(b)?);
+            let name = state.name.as_str();
+            let pulls = one.derivative.uses(name) && other.derivative.uses(name);
+            pulls.then(|| self.connection(one, other, Expr::symbol(name), (name, -1.0), format!("across {name}")))
+        };
+        let known = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some());
+        known.filter_map(twist).collect()
+    }
+
+    /// The force between two parts, over the deflection `x` of what connects them. It pulls at the first by the spring rate times the sign beside a
+    /// symbol that it is linear in.
+    fn connection(
+        &self,
+        one: &Motion<'_>,
+        other: &Motion<'_>,
+        x: Expr,
+        (symbol, sign): (&str, f64),
+        words: String,
+    ) -> Slot {
+        let target = Target::Derivatives(vec![(one.v.to_owned(), 1.0), (other.v.to_owned(), -1.0)]);
+        let mut slot = Slot::new(Place::Connection, format!("state:{}", one.v), words, target);
+        let v = Expr::symbol(one.v) - Expr::symbol(other.v);
+        slot.loops = self.loops(&v);
+        slot.offer(self.simulation, "x", x);
+        slot.offer(self.simulation, "v", v);
+        let (force, divided) = match force_path(self.simulation, one.derivative) {
+            ForcePath::Quotient(force, _) => (force, None),
+            ForcePath::Divided(mass) => (one.derivative, Some(mass)),
+            ForcePath::Bare => (one.derivative, None),
+        };
+        let whole = |e: Expr| match divided {
+            Some(mass) => (mass.clone() * e).simplified(),
+            None => e,
+        };
+        let coupling = force.terms().into_iter().filter(|(_, t)| t.uses(symbol) || t.uses(other.v));
+        if let Some(size) = coupling.map(|(_, t)| t.clone().abs()).reduce(|a, b| a + b) {
+            slot.offer(self.simulation, "F", whole(size));
+        }
+        if let Some(k) = linear_coefficient(self.simulation, force, symbol) {
+            slot.offer(self.simulation, "k", whole(if sign < 0.0 { (-k).simplified() } else { k }));
+        }
+        if let Some(c) = linear_coefficient(self.simulation, force, other.v) {
+            slot.offer(self.simulation, "c", whole(c));
+        }
+        slot.context = vec![one.derivative.clone()];
+        slot
     }
 
     /// The input by which a damping force is controlled, as the voltage of a magnetorheological damper: the coefficient of the velocity

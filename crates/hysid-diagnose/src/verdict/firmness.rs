@@ -1,13 +1,9 @@
 //! How firmly the members of the winning set are named: their support among all sets that were fitted, less what speaks against trusting it.
 
-use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights};
+use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights, stretched};
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::mechanism::Family;
 use crate::model::hypothesis::Hypothesis;
-
-/// Share of the set's log evidence that a member must bring: laws are written only so exactly, and beside a large effect the rest of its own
-/// law looks like a small one.
-const TRIFLE: f64 = 0.02;
 
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
@@ -48,7 +44,7 @@ pub fn firmness(
         // A fractional element is a relaxation and a mode within the band that was excited.
         let of_a_spectrum =
             own.extends_a_spectrum() && best.effects.iter().any(|o| o.mechanism.family == Family::LinearMemory);
-        let vague = own.stands_for_others() || of_a_spectrum || trifle(pool, winner, i) || has_twin(pool, winner, i);
+        let vague = own.stands_for_others() || of_a_spectrum || stretched(&best.base, e) || has_twin(pool, winner, i);
         if doubtful || twice || vague {
             s.weaken();
         }
@@ -73,14 +69,6 @@ pub fn is_a_spectrum(h: &Hypothesis<'_>) -> bool {
             i != j && more
         })
     })
-}
-
-/// Whether a member of a set adds next to nothing beside what the others explain, where the set without it was fitted.
-fn trifle(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
-    let rest = pool[winner].key_without(member);
-    let whole = pool[winner].log_evidence - pool[0].log_evidence;
-    !rest.is_empty()
-        && pool.iter().any(|h| h.key() == rest && pool[winner].log_evidence - h.log_evidence < TRIFLE * whole)
 }
 
 /// Whether a set with a member of the twin family in this member's place follows the recording as well. That it needs a parameter more makes

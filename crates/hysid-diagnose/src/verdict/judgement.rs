@@ -2,11 +2,12 @@
 
 use super::firmness::{firmness, likelihoods};
 use super::remaining::Remaining;
+use super::trifles::{Trifle, without_trifles};
 use super::wanders::{Wanders, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
-use crate::model::hypothesis::{Effect, Hypothesis, Key};
+use crate::model::hypothesis::{Effect, Hypothesis, best_that_says, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::explore::Explored;
 use crate::search::leaves_more;
@@ -16,8 +17,10 @@ use crate::search::screen::Candidate;
 pub struct Judgement<'d> {
     weighed: Vec<Weighed>,
     probability: Vec<f64>,
-    /// The set that the evidence prefers, as a place in the pool; the simulation as it is where nothing is significant.
+    /// The set that the evidence prefers, without what adds next to nothing, as a place in the pool; the simulation as it is where nothing is significant.
     pub winner: usize,
+    /// What adds next to nothing beside it.
+    pub trifles: Vec<Trifle>,
     /// What its residual holds.
     pub rest: Remaining<'d>,
     /// The same as it is reported.
@@ -54,8 +57,12 @@ impl<'d> Judgement<'d> {
         let (setting, significant) = (&search.setting, *significant);
         let unfinished = || setting.budget.unfinished();
         let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
-        let blocks = block_scores(setting, pool);
-        let winner = if significant { tie_broken(pool, &blocks) } else { 0 };
+        let mut blocks = block_scores(setting, pool);
+        let preferred = if significant { tie_broken(pool, &blocks) } else { 0 };
+        let (winner, trifles) = without_trifles(pool, preferred);
+        if winner != preferred {
+            blocks[winner] = block_score(setting, &pool[winner]);
+        }
         let rest = Remaining::of(search, pool, winner, significant);
         let probability = likelihoods(pool, &weighed, &blocks, winner, rest.imperfect);
         let mut support = firmness(pool, &weighed, &probability, winner, rest.imperfect);
@@ -109,6 +116,7 @@ impl<'d> Judgement<'d> {
             weighed,
             probability,
             winner,
+            trifles,
             rest,
             remaining,
             told,
@@ -133,8 +141,8 @@ impl<'d> Judgement<'d> {
     pub fn steady(&self, pool: &[Hypothesis<'_>]) -> usize {
         let best = &pool[self.winner];
         let key = best.key_of(|i| self.wandering[i].as_ref().is_none_or(|w| w.probability <= LIKELY));
-        let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence - pool[0].log_evidence)).collect();
-        place_of(&sets, &key, STEADY * sets[self.winner].1)
+        let gain = |i: usize| pool[i].log_evidence - pool[0].log_evidence;
+        best_that_says(pool, &key).filter(|&i| gain(i) > STEADY * gain(self.winner)).unwrap_or(0)
     }
 
     /// What most likely varies in the place of a member of the winner, in words, where that is likelier than the member.
@@ -147,12 +155,6 @@ impl<'d> Judgement<'d> {
     pub fn contest<'a>(&'a self, pool: &'a [Hypothesis<'d>]) -> Contest<'a, 'd> {
         Contest { pool, weighed: &self.weighed, probability: &self.probability, winner: self.winner }
     }
-}
-
-/// The place of the best set that makes this statement, of sets by statement and gain; the first where none gains more than the least.
-fn place_of(sets: &[(Key, f64)], key: &Key, least: f64) -> usize {
-    let found = sets.iter().enumerate().filter(|(_, (k, gain))| k == key && *gain > least);
-    found.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).map_or(0, |(i, _)| i)
 }
 
 /// What speaks against writing a set into the simulation, in words; `least` is the simulation as it is with the least error.
@@ -187,20 +189,4 @@ fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String
         Some(format!("{id}: for a firm answer the recording lacks something: {lacking}"))
     };
     best.effects.iter().map(told).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_members_that_stay_are_written_where_they_bring_enough() {
-        let key = |ids: &[&'static str]| -> Key { ids.iter().map(|id| (*id, String::new())).collect() };
-        let sets =
-            [(key(&[]), 0.0), (key(&["a"]), 55.0), (key(&["b"]), 90.0), (key(&["a"]), 60.0), (key(&["a", "b"]), 100.0)];
-        assert_eq!(place_of(&sets, &key(&["a"]), 50.0), 3);
-        assert_eq!(place_of(&sets, &key(&["a"]), 70.0), 0);
-        assert_eq!(place_of(&sets, &key(&["c"]), 50.0), 0);
-        assert_eq!(place_of(&sets, &key(&[]), 50.0), 0);
-    }
 }

@@ -8,6 +8,7 @@ pub(crate) mod firmness;
 pub(crate) mod judgement;
 pub mod reliability;
 mod remaining;
+pub(crate) mod trifles;
 mod wanders;
 pub(crate) mod weigh;
 

@@ -5,7 +5,7 @@
 
 use super::weigh::EVIDENCE_WEIGHT;
 use crate::mechanism::Family;
-use crate::model::hypothesis::{Effect, Hypothesis};
+use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
 use crate::openset::noises;
 use crate::openset::varying::varying;
 use crate::search::Search;
@@ -42,9 +42,7 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
         if best.effects[member].mechanism.family != Family::TimeVariation {
             return None;
         }
-        let key = best.key_without(member);
-        let rest = pool.iter().filter(|h| h.key() == key);
-        let rest = rest.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let rest = &pool[best_that_says(pool, &best.key_without(member))?];
         let kind = search.setting.noise;
         let found = varying(&rest.base, kind, &noises(&rest.base, kind))?;
         // What varies has paid for the parameters among which it was found; a moment was looked for too.

@@ -118,10 +118,18 @@ pub fn worse_on_blocks(blocks: &[Option<(f64, Vec<f64>)>], winner: usize) -> boo
     difference(best, none).is_some_and(|(mean, error)| mean > error)
 }
 
-/// Whether a parameter of the effect stands at a bound: the law is stretched to what it was not made for, a sibling may be meant.
+/// Whether a parameter of the effect stands at a bound: the law is not what the recording shows, a sibling may be meant.
 pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
-    let places = effect.written.parameters_of();
-    places.iter().filter_map(|n| base.model.place_of(n)).any(|place| base.fit.at_bound[place])
+    any_at_bound(base, effect.written.parameters_of().iter())
+}
+
+/// Whether an amplitude of the effect stands at a bound: the law is stretched to what it was not made for, something else may be meant.
+pub fn stretched(base: &Base<'_>, effect: &Effect) -> bool {
+    any_at_bound(base, effect.written.amplitudes.iter().map(|a| &a.name))
+}
+
+fn any_at_bound<'n>(base: &Base<'_>, mut names: impl Iterator<Item = &'n String>) -> bool {
+    names.any(|name| base.model.place_of(name).is_some_and(|place| base.fit.at_bound[place]))
 }
 
 /// Whether two sets say the same of families and slots and differ in members only.

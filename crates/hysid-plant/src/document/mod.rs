@@ -223,25 +223,27 @@ impl Simulation {
         self.outputs.iter_mut().for_each(|o| o.expression = rebuild(&o.expression));
     }
 
-    /// The unit of a symbol: as declared for a parameter or state, from the end of the column's name for an input.
+    /// The unit of a symbol: as declared for a parameter or state, from the end of the column's name for an input and for a state of which nothing is
+    /// declared that is written out as it stands.
     pub fn unit_of(&self, symbol: &str) -> Option<Unit> {
-        if symbol == "t" {
-            return Unit::parse("s").ok();
-        }
-        if symbol == "pi" {
-            return Some(Unit::none());
-        }
-        if let Some(parameter) = self.parameter(symbol) {
-            return parameter.unit.clone();
-        }
-        if let Some(state) = self.state(symbol) {
-            // A state that is written out as it stands has the unit of its column.
-            let column = || {
+        self.declared_unit(symbol).or_else(|| {
+            if self.state(symbol).is_some() {
                 let own = |o: &&Output| matches!(&o.expression, Expr::Symbol(s) if s == symbol);
-                self.outputs.iter().find(own).and_then(|o| Unit::of_column(&o.column))
-            };
-            return state.unit.clone().or_else(column);
+                return self.outputs.iter().find(own).and_then(|o| Unit::of_column(&o.column));
+            }
+            Unit::of_column(&self.input(symbol)?.column)
+        })
+    }
+
+    /// The unit that the file declares for a symbol.
+    pub(crate) fn declared_unit(&self, symbol: &str) -> Option<Unit> {
+        match symbol {
+            "t" => Unit::parse("s").ok(),
+            "pi" => Some(Unit::none()),
+            _ => match self.parameter(symbol) {
+                Some(parameter) => parameter.unit.clone(),
+                None => self.state(symbol)?.unit.clone(),
+            },
         }
-        Unit::of_column(&self.input(symbol)?.column)
     }
 }
