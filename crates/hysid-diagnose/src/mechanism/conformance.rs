@@ -40,7 +40,8 @@ specimens!(
     "stalling_wing",
     "cylinder",
     "shaker",
-    "shaft"
+    "shaft",
+    "stage"
 );
 
 /// A breach of the suite's laws.
@@ -211,6 +212,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.002, 100.0),
     (0.0004, 10.0),
     (0.01, 1.0),
+    (0.01, 4.0),
 ];
 
 /// A bench for each specimen.

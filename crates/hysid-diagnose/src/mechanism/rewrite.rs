@@ -8,7 +8,7 @@ use super::copies::follow;
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
 use super::{Change, Law, Mechanism, Purpose, Role, Start};
-use crate::slot::{ForcePath, Slot, Target, force_path};
+use crate::slot::{ForcePath, Pull, Slot, Target, force_path};
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -135,10 +135,11 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
         (Target::Derivatives(states), Change::Force(text) | Change::Drive(text) | Change::Outflow(text)) => {
             let force = writer.text(text)?;
             let resists = if matches!(change, Change::Drive(_)) { -1.0 } else { 1.0 };
-            for (name, sign) in states {
+            for pull in states {
+                let (name, force) = (&pull.state, pull.of(&force));
                 let derivative = simulation.state(name).ok_or("the state is gone")?.derivative.clone();
                 let joined = |sum: Expr, part: &Expr| {
-                    if sign * resists > 0.0 { sum - part.clone() } else { sum + part.clone() }
+                    if pull.sign * resists > 0.0 { sum - part.clone() } else { sum + part.clone() }
                 };
                 let (written, rate) = match force_path(simulation, &derivative) {
                     ForcePath::Quotient(above, below) => {
@@ -160,7 +161,7 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
         (_, Change::Separation { at, by }) => separation(simulation, slot, (at, by), writer),
         (Target::Derivatives(states), Change::Inertia { force, mass }) => {
             let (force, more) = (writer.text(force)?, writer.text(mass)?);
-            for (name, _) in states {
+            for Pull { state: name, .. } in states {
                 let derivative = simulation.state(name).ok_or("the state is gone")?.derivative.clone();
                 let written = match force_path(simulation, &derivative) {
                     ForcePath::Quotient(above, below) => {

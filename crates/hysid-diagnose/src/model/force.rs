@@ -21,7 +21,7 @@ pub fn pushed(simulation: &Simulation) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for slot in Structure::of(simulation).slots.iter().filter(|s| s.place == Place::Disturbance) {
         if let Target::Derivatives(states) = &slot.target {
-            names.extend(states.iter().map(|(name, _)| name.clone()));
+            names.extend(states.iter().map(|pull| pull.state.clone()));
         }
     }
     names.truncate(MOST);

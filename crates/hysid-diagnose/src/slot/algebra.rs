@@ -38,29 +38,40 @@ pub(crate) fn linear_coefficient(simulation: &Simulation, expr: &Expr, symbol: &
 
 /// `above/below` without the factors that both have.
 pub(crate) fn quotient(above: Expr, below: Expr) -> Expr {
-    fn factors(product: Expr, positive: &mut bool) -> Vec<Expr> {
+    fn collect(product: Expr, above: &mut Vec<Expr>, below: &mut Vec<Expr>, positive: &mut bool) {
         match product {
             Expr::Binary(BinaryOp::Mul, a, b) => {
-                factors(*a, positive).into_iter().chain(factors(*b, positive)).collect()
+                collect(*a, above, below, positive);
+                collect(*b, above, below, positive);
+            }
+            Expr::Binary(BinaryOp::Div, a, b) => {
+                collect(*a, above, below, positive);
+                collect(*b, below, above, positive);
             }
             Expr::Neg(a) => {
                 *positive = !*positive;
-                factors(*a, positive)
+                collect(*a, above, below, positive);
             }
-            other => vec![other],
+            Expr::Number(n) if n < 0.0 => {
+                *positive = !*positive;
+                collect(Expr::Number(-n), above, below, positive);
+            }
+            Expr::Number(1.0) => {}
+            other => above.push(other),
         }
     }
-    let mut positive = true;
-    let (mut above, mut below) = (factors(above, &mut positive), factors(below, &mut positive));
-    above.retain(|a| match below.iter().position(|b| a == b) {
+    let (mut up, mut down, mut positive) = (Vec::new(), Vec::new(), true);
+    collect(above, &mut up, &mut down, &mut positive);
+    collect(below, &mut down, &mut up, &mut positive);
+    up.retain(|a| match down.iter().position(|b| a == b) {
         Some(at) => {
-            below.remove(at);
+            down.remove(at);
             false
         }
         None => true,
     });
     let product = |factors: Vec<Expr>| factors.into_iter().reduce(|a, b| a * b).unwrap_or(Expr::Number(1.0));
-    let found = (product(above) / product(below)).simplified();
+    let found = (product(up) / product(down)).simplified();
     if positive { found } else { -found }
 }
 
@@ -138,6 +149,8 @@ mod tests {
         check("c*m", "k*m", "c/k");
         check("c", "k*m", "c/(k*m)");
         check("k*(-c)", "k", "-c");
+        check("k*(-1)/n", "k/n^2", "-(n^2/n)");
+        check("k/n*c", "c*(k/n)", "1");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use hysid_plant::{Expr, Function, Memory, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
 use super::motion::{ForcePath, Kinematic, Motion, force_path, kinematic, motions};
-use super::{Place, Sensed, Slot, Target, sensed};
+use super::{OWN_VELOCITY, Place, Pull, Sensed, Slot, Target, sensed};
 
 /// What a simulation is made of, as far as mechanisms care.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ impl Structure {
         let sensed = sensed(original);
         for slot in &mut slots {
             if let Target::Derivatives(states) = &slot.target {
-                let here = |s: &&Sensed| states.iter().any(|(name, _)| *name == s.state);
+                let here = |s: &&Sensed| states.iter().any(|pull| pull.state == s.state);
                 slot.sensed = sensed.iter().filter(here).cloned().collect();
             }
             for (i, input) in (1..).zip(&simulation.inputs) {
@@ -228,8 +228,11 @@ impl Finder<'_> {
     }
 
     /// Offers the velocity of a part and, where it has one, its displacement.
-    fn offer_motion(&self, slot: &mut Slot, motion: &Motion<'_>) {
-        slot.offer(self.simulation, "v", Expr::symbol(motion.v));
+    pub(super) fn offer_motion(&self, slot: &mut Slot, motion: &Motion<'_>) {
+        slot.offer(self.simulation, "v", motion.rate());
+        if motion.scale.is_some() {
+            slot.offer(self.simulation, OWN_VELOCITY, Expr::symbol(motion.v));
+        }
         if let Some(x) = motion.x {
             slot.offer(self.simulation, "x", Expr::symbol(x));
         }
@@ -251,10 +254,10 @@ impl Finder<'_> {
     }
 
     fn store_slot(&self, place: Place, label: String, name: &str, derivative: &Expr) -> Slot {
-        let target = Target::Derivatives(vec![(name.to_owned(), 1.0)]);
+        let target = Target::Derivatives(vec![Pull::new(name, 1.0)]);
         let mut slot = Slot::new(place, label, name.to_owned(), target);
         slot.offer(self.simulation, "s", Expr::symbol(name));
-        self.offer_force(&mut slot, derivative, Some(name), name);
+        self.offer_force(&mut slot, derivative, Some(name), name, None);
         slot.context = vec![derivative.clone()];
         slot
     }
@@ -348,7 +351,7 @@ impl Finder<'_> {
             _ => None,
         });
         let stored = stored
-            .filter_map(|(name, _)| self.simulation.state(name))
+            .filter_map(|pull| self.simulation.state(&pull.state))
             .map(|s| self.store_slot(Place::Disturbance, label(), &s.name, &s.derivative));
         let mut slots: Vec<Slot> = moving.chain(stored).collect();
         if slots.is_empty() {

@@ -1,15 +1,23 @@
-//! The slots at which forces stand: on a moving part, between two of them, at the output of a static force law.
+//! The slots at which forces stand: on a moving part, at the output of a static force law.
 
-use hysid_plant::{BinaryOp, Expr, State};
+use hysid_plant::Expr;
 
-use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, size};
+use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, quotient, size};
 use super::find::Finder;
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
-use super::{Place, Slot, Target};
+use super::{Place, Pull, Slot, Target};
 
 impl Finder<'_> {
-    /// Offers what every force slot has: the size of the forces, the mass, the linear stiffness and damping.
-    pub(super) fn offer_force(&self, slot: &mut Slot, derivative: &Expr, x: Option<&str>, v: &str) {
+    /// Offers what every force slot has: the size of the forces, the mass, the linear stiffness and damping. `scale` is what the rate of the
+    /// displacement is for each unit of the velocity where that is not one.
+    pub(super) fn offer_force(
+        &self,
+        slot: &mut Slot,
+        derivative: &Expr,
+        x: Option<&str>,
+        v: &str,
+        scale: Option<&Expr>,
+    ) {
         let simulation = self.simulation;
         let below = |symbol: &str, force: &Expr| Some((-linear_coefficient(simulation, force, symbol)?).simplified());
         let (force, mass) = match force_path(simulation, derivative) {
@@ -26,15 +34,16 @@ impl Finder<'_> {
                 (derivative, None)
             }
         };
-        let quotient = matches!(force_path(simulation, derivative), ForcePath::Divided(_));
+        let divided = matches!(force_path(simulation, derivative), ForcePath::Divided(_));
         let scaled = |e: Expr| match mass {
-            Some(mass) if quotient => (mass.clone() * e).simplified(),
+            Some(mass) if divided => (mass.clone() * e).simplified(),
             _ => e,
         };
         if let Some(k) = x.and_then(|x| below(x, force)) {
             slot.offer(simulation, "k", scaled(k));
         }
         if let Some(c) = below(v, force) {
+            let c = scale.map_or(c.clone(), |scale| quotient(c, scale.clone()));
             slot.offer(simulation, "c", scaled(c));
         }
         if let Some(mass) = mass.filter(|m| only_parameters(simulation, m)) {
@@ -47,100 +56,26 @@ impl Finder<'_> {
     }
 
     pub(super) fn motion_slot(&self, place: Place, label: String, motion: &Motion<'_>) -> Slot {
-        let target = Target::Derivatives(vec![(motion.v.to_owned(), 1.0)]);
+        let target = Target::Derivatives(vec![Pull::new(motion.v, 1.0)]);
         let mut slot = Slot::new(place, label, format!("at {}", motion.name()), target);
         let v = Expr::symbol(motion.v);
         slot.loops = self.loops(&v);
         if let Some(control) = self.control(motion.derivative, &v) {
             slot.offer(self.simulation, "control", control);
         }
-        slot.offer(self.simulation, "v", v);
+        self.offer_motion(&mut slot, motion);
         if let Some(x) = motion.x {
-            slot.offer(self.simulation, "x", Expr::symbol(x));
             if let Some(rad) = self.simulation.unit_of(x).as_ref().and_then(angle) {
                 slot.offer(self.simulation, "rad", rad);
             }
         }
-        self.offer_force(&mut slot, motion.derivative, motion.x, motion.v);
+        self.offer_force(&mut slot, motion.derivative, motion.x, motion.v, motion.scale.as_ref());
         slot.context = vec![motion.derivative.clone()];
         slot
     }
 
     pub(super) fn forces(&self) -> Vec<Slot> {
         self.motions.iter().map(|m| self.motion_slot(Place::Force, format!("state:{}", m.v), m)).collect()
-    }
-
-    pub(super) fn connections(&self) -> Vec<Slot> {
-        let mut slots = Vec::new();
-        for (i, one) in self.motions.iter().enumerate() {
-            for other in &self.motions[i + 1..] {
-                let (Some(x1), Some(x2)) = (one.x, other.x) else { continue };
-                let units = (self.simulation.unit_of(x1), self.simulation.unit_of(x2));
-                let alike = match &units {
-                    (Some(a), Some(b)) => a.same_dimension(b),
-                    _ => true,
-                };
-                if alike && one.derivative.uses(x2) && other.derivative.uses(x1) {
-                    let x = Expr::symbol(x1) - Expr::symbol(x2);
-                    slots.push(self.connection(one, other, x, (x2, 1.0), format!("between {x1} and {x2}")));
-                }
-            }
-        }
-        slots.extend(self.twists());
-        slots
-    }
-
-    /// Connections whose deflection is a state of its own, the velocity of one part less that of another: a shaft's twist.
-    fn twists(&self) -> Vec<Slot> {
-        let motion = |e: &Expr| self.motions.iter().find(|m| matches!(e, Expr::Symbol(s) if s == m.v));
-        let twist = |state: &State| {
-            let Expr::Binary(BinaryOp::Sub, a, b) = &state.derivative else { return None };
-            let (one, other) = (motion(a)?, motion(b)?);
-            let name = state.name.as_str();
-            let pulls = one.derivative.uses(name) && other.derivative.uses(name);
-            pulls.then(|| self.connection(one, other, Expr::symbol(name), (name, -1.0), format!("across {name}")))
-        };
-        let known = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some());
-        known.filter_map(twist).collect()
-    }
-
-    /// The force between two parts, over the deflection `x` of what connects them. It pulls at the first by the spring rate times the sign beside a
-    /// symbol that it is linear in.
-    fn connection(
-        &self,
-        one: &Motion<'_>,
-        other: &Motion<'_>,
-        x: Expr,
-        (symbol, sign): (&str, f64),
-        words: String,
-    ) -> Slot {
-        let target = Target::Derivatives(vec![(one.v.to_owned(), 1.0), (other.v.to_owned(), -1.0)]);
-        let mut slot = Slot::new(Place::Connection, format!("state:{}", one.v), words, target);
-        let v = Expr::symbol(one.v) - Expr::symbol(other.v);
-        slot.loops = self.loops(&v);
-        slot.offer(self.simulation, "x", x);
-        slot.offer(self.simulation, "v", v);
-        let (force, divided) = match force_path(self.simulation, one.derivative) {
-            ForcePath::Quotient(force, _) => (force, None),
-            ForcePath::Divided(mass) => (one.derivative, Some(mass)),
-            ForcePath::Bare => (one.derivative, None),
-        };
-        let whole = |e: Expr| match divided {
-            Some(mass) => (mass.clone() * e).simplified(),
-            None => e,
-        };
-        let coupling = force.terms().into_iter().filter(|(_, t)| t.uses(symbol) || t.uses(other.v));
-        if let Some(size) = coupling.map(|(_, t)| t.clone().abs()).reduce(|a, b| a + b) {
-            slot.offer(self.simulation, "F", whole(size));
-        }
-        if let Some(k) = linear_coefficient(self.simulation, force, symbol) {
-            slot.offer(self.simulation, "k", whole(if sign < 0.0 { (-k).simplified() } else { k }));
-        }
-        if let Some(c) = linear_coefficient(self.simulation, force, other.v) {
-            slot.offer(self.simulation, "c", whole(c));
-        }
-        slot.context = vec![one.derivative.clone()];
-        slot
     }
 
     /// The input by which a damping force is controlled, as the voltage of a magnetorheological damper: the coefficient of the velocity
@@ -205,5 +140,25 @@ impl Finder<'_> {
             }
         }
         slots
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::connections::tests::slots;
+    use super::*;
+
+    #[test]
+    fn a_displacement_may_be_a_multiple_of_what_its_velocity_sums_up_to() {
+        let check = |rate: &str, unit: &str, v: &str| {
+            let found = slots(Place::Force, &[("x", rate, unit), ("w2", "(u - c*w2 - k*x)/J", "rad/s")]);
+            assert_eq!(found[0][..3], [if v == "w2" { "" } else { "x" }, v, if v == "w2" { "" } else { "k" }]);
+        };
+        check("1000*w2", "mm", "1000*w2");
+        check("w2/J", "m", "1/J*w2");
+        check("w2*180/pi", "deg", "180/pi*w2");
+        // A store that a flow fills, and what depends on more than a velocity, are no displacements.
+        check("0.01*w2", "K", "w2");
+        check("1000*(w2 - k*x)", "mm", "w2");
     }
 }

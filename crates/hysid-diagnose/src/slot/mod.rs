@@ -3,13 +3,15 @@
 //! A state `x` whose derivative is exactly the state `v` is a displacement with its velocity, and the derivative of `v` holds
 //! the force. Where that derivative is a quotient `(...)/m` by parameters, forces enter above the line and have the unit of a
 //! force; else they have the unit of the derivative. Two displacements that appear in each other's force are connected, and a
-//! law can stand between them; so are two velocities whose difference is the derivative of a state that both feel. A state without a partner whose unit is a speed is a velocity without its displacement; any
-//! other is a store. A simulation without states is a static relation: its force laws stand at the output, over the inputs
+//! law can stand between them, also over a gear; so are two velocities whose difference, but for factors, is the derivative of a state that both
+//! feel. A displacement may also be a multiple of the integral of its velocity (`1000*v`, or `p/m` of a momentum). A state without a partner
+//! whose unit is a speed is a velocity without its displacement; any other is a store. A simulation without states is a static relation: its force laws stand at the output, over the inputs
 //! that are a displacement or a velocity by their unit or name (where there is only a displacement, the velocity is `d(x)`).
 //! Where one part of a simulation drives another and nothing comes back, what it passes on is an input of the second; where that is a sum
 //! of several states, the sum is.
 
 mod algebra;
+mod connections;
 mod find;
 mod forces;
 mod motion;
@@ -25,6 +27,9 @@ pub use find::Structure;
 
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
+
+/// The symbol for the velocity as the simulation has it, where that is not the rate of the displacement.
+pub(crate) const OWN_VELOCITY: &str = "v_own";
 
 /// What kind of place a slot is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -52,8 +57,8 @@ pub enum Place {
 /// Where a law's text ends up.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Target {
-    /// Taken from the derivatives of these states, each with its sign, above the line of a quotient by a mass.
-    Derivatives(Vec<(String, f64)>),
+    /// Taken from the derivatives of these states, above the line of a quotient by a mass.
+    Derivatives(Vec<Pull>),
     /// Added to this output.
     Output(String),
     /// Replaces this symbol in every equation.
@@ -61,6 +66,32 @@ pub(crate) enum Target {
     /// Replaces this symbol in the derivatives of these states. Where the signal is a sum, the expression is what it holds besides the
     /// symbol.
     SymbolIn(String, Vec<String>, Option<Expr>),
+}
+
+/// A state whose derivative a force changes, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pull {
+    /// The state.
+    pub state: String,
+    /// Whether the force is taken from it (1) or added to it (-1).
+    pub sign: f64,
+    /// What the force is multiplied by where that is not one: the ratio of a gear.
+    pub lever: Option<Expr>,
+}
+
+impl Pull {
+    /// A force that is taken from this state, times the sign.
+    fn new(state: &str, sign: f64) -> Self {
+        Self { state: state.to_owned(), sign, lever: None }
+    }
+
+    /// The part of a force that this state feels.
+    pub fn of(&self, force: &Expr) -> Expr {
+        match &self.lever {
+            Some(lever) => lever.clone() * force.clone(),
+            None => force.clone(),
+        }
+    }
 }
 
 /// A place of a simulation at which a mechanism can stand.
@@ -191,10 +222,18 @@ impl Slot {
     /// Whether the equations here contain an expression of this form. Symbols of the slot stand for what they are here, a
     /// single capital letter for anything.
     pub fn shows(&self, form: &str) -> bool {
-        let Some(form) = pattern::prepare(form, |s| self.symbols.get(s).map(|q| q.expression.clone())) else {
-            return false;
+        let shown = |v: &str| {
+            let symbol = |s: &str| self.symbols.get(if s == "v" { v } else { s }).map(|q| q.expression.clone());
+            let form = pattern::prepare(form, symbol);
+            form.is_some_and(|form| self.context.iter().any(|e| pattern::occurs(&form, e)))
         };
-        self.context.iter().any(|e| pattern::occurs(&form, e))
+        shown("v") || (self.has(OWN_VELOCITY) && shown(OWN_VELOCITY))
+    }
+
+    /// Whether the displacement's rate is the velocity, but for a number: what depends on it is then an energy over the same coordinate.
+    pub(crate) fn has_own_coordinate(&self) -> bool {
+        let scaled = self.quantity("v").filter(|_| self.has(OWN_VELOCITY));
+        scaled.is_none_or(|v| v.expression.symbols().iter().filter(|s| *s != "pi").count() == 1)
     }
 
     /// The share of attached flow, or of separated flow, that the equations here have as a function of the angle.

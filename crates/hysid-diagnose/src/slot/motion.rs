@@ -1,8 +1,8 @@
 //! What moves in a simulation: velocities with their displacements, told by the equations, by units, by names; how a force enters.
 
-use hysid_plant::{BinaryOp, Expr, Simulation, Unit};
+use hysid_plant::{BinaryOp, Expr, Simulation, State, Unit};
 
-use super::algebra::only_parameters;
+use super::algebra::{coefficient, only_parameters};
 
 /// How forces enter the derivative of a velocity.
 pub(crate) enum ForcePath<'a> {
@@ -41,11 +41,21 @@ pub(super) struct Motion<'a> {
     pub x: Option<&'a str>,
     pub v: &'a str,
     pub derivative: &'a Expr,
+    /// What the rate of the displacement is for each unit of the velocity where that is not one: `1000` from m/s to mm, `1/m` from a momentum.
+    pub scale: Option<Expr>,
 }
 
 impl Motion<'_> {
     pub fn name(&self) -> &str {
         self.x.unwrap_or(self.v)
+    }
+
+    /// The rate of the displacement; the velocity where it has none.
+    pub fn rate(&self) -> Expr {
+        match &self.scale {
+            Some(scale) => scale.clone() * Expr::symbol(self.v),
+            None => Expr::symbol(self.v),
+        }
     }
 }
 
@@ -88,11 +98,28 @@ pub(super) fn angle(unit: &Unit) -> Option<Expr> {
     }
 }
 
+/// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name.
+fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Expr> {
+    let others = |s: &String| s != velocity && s != "pi" && simulation.parameter(s).is_none();
+    if position.derivative.symbols().iter().any(others)
+        || kinematic(simulation.unit_of(&position.name).as_ref(), &position.name) != Kinematic::Displacement
+    {
+        return None;
+    }
+    let scale = coefficient(&position.derivative, velocity)?.simplified();
+    (!scale.has_memory() && only_parameters(simulation, &scale)).then_some(scale)
+}
+
 pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> Vec<Motion<'a>> {
     let known = || simulation.states.iter().filter(|s| original.state(&s.name).is_some());
     let mut found = Vec::new();
     for velocity in known() {
+        let scaled = |s: &&State| scale(simulation, s, &velocity.name);
         let position = known().find(|s| s.derivative == Expr::symbol(&velocity.name));
+        let (position, scale) = match position {
+            Some(x) => (Some(x), None),
+            None => known().find_map(|s| Some((s, scaled(&s)?))).unzip(),
+        };
         // A chain x' = v, v' = a, a' = ...: v is then a displacement's velocity only, not one with a force.
         let passes_on = matches!(&velocity.derivative, Expr::Symbol(s) if original.state(s).is_some());
         let alone = kinematic(velocity.unit.as_ref(), &velocity.name) == Kinematic::Velocity;
@@ -101,6 +128,7 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
                 x: position.map(|s| s.name.as_str()),
                 v: &velocity.name,
                 derivative: &velocity.derivative,
+                scale,
             });
         }
     }

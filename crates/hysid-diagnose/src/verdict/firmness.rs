@@ -2,7 +2,7 @@
 
 use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights, stretched};
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
-use crate::mechanism::Family;
+use crate::mechanism::{Family, catalogue};
 use crate::model::hypothesis::Hypothesis;
 
 /// Log likelihood by which a set must trail before the recording refutes it.
@@ -48,11 +48,20 @@ pub fn firmness(
         if doubtful || twice || vague {
             s.weaken();
         }
-        if bounded(&best.base, e) || e.mechanism.family.members_imitate() || e.written.sum_of_others {
+        let bounded = bounded(&best.base, e);
+        if bounded && is_alone(own) {
+            s.weaken();
+        }
+        if bounded || e.mechanism.family.members_imitate() || e.written.sum_of_others {
             s.mechanism = s.mechanism.min(NOT_FIRM);
         }
     }
     support
+}
+
+/// Whether a family has one member only: no sibling can be meant where that does not fit.
+fn is_alone(family: Family) -> bool {
+    catalogue().iter().filter(|m| m.family == family).count() == 1
 }
 
 /// Whether a set is a sum of relaxations: two members with a linear memory, or one beside a mode at the same slot. One relaxation is an element; two in

@@ -1,7 +1,7 @@
 //! An inertia that depends on the position.
 
 use crate::mechanism::{Block, Family, Law, Mechanism, Need};
-use crate::slot::Place;
+use crate::slot::{OWN_VELOCITY, Place};
 
 /// An inertia that depends on the position.
 pub static POSITION_DEPENDENT_INERTIA: Mechanism = Mechanism {
@@ -9,11 +9,12 @@ pub static POSITION_DEPENDENT_INERTIA: Mechanism = Mechanism {
     family: Family::Inertia,
     block: Block::Inertia,
     places: &[Place::Force],
-    applies: |slot| slot.has("x") && !slot.shows("x*v^2") && !slot.mass_varies(),
+    applies: |slot| slot.has("x") && slot.has_own_coordinate() && !slot.shows("x*v^2") && !slot.mass_varies(),
     already: &[],
     law: |slot, _| {
         let measure = format!("{}/x^2", slot.mass_measure());
-        Law::inertia("m_1*x*v^2", "m_1*x^2").amplitude("m_1", measure, -0.1, 2.0)
+        let force = if slot.has(OWN_VELOCITY) { "m_1*x*v*v_own" } else { "m_1*x*v^2" };
+        Law::inertia(force, "m_1*x^2").amplitude("m_1", measure, -0.1, 2.0)
     },
     contains: &[],
     confusable: &["cubic_stiffness"],

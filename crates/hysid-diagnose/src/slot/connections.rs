@@ -1,0 +1,305 @@
+//! The slots between two moving parts: of two displacements, of a deflection that is a state of its own, of a part and a motion that is prescribed.
+
+use hysid_plant::{Expr, Simulation, State};
+
+use super::algebra::{coefficient, linear_coefficient, only_parameters, quotient};
+use super::find::Finder;
+use super::motion::{ForcePath, Motion, force_path};
+use super::{Place, Pull, Slot, Target};
+
+/// Whether a product is told with a minus.
+fn is_negative(product: &Expr) -> bool {
+    match quotient(product.clone(), Expr::Number(1.0)) {
+        Expr::Neg(_) => true,
+        Expr::Number(n) => n < 0.0,
+        _ => false,
+    }
+}
+
+/// The terms of the force on a part, each with its sign.
+fn forces_of<'e>(simulation: &Simulation, motion: &Motion<'e>) -> impl Iterator<Item = (f64, &'e Expr)> {
+    let force = match force_path(simulation, motion.derivative) {
+        ForcePath::Quotient(force, _) => force,
+        _ => motion.derivative,
+    };
+    force.terms().into_iter()
+}
+
+/// What connects two parts.
+struct Stretch<'a> {
+    /// The deflection.
+    x: Expr,
+    /// Its rate.
+    v: Expr,
+    /// A symbol that the force on the first part is linear in, where the connection is.
+    symbol: &'a str,
+    /// The sign of the spring rate there.
+    sign: f64,
+    /// What the first part feels of the force, where that is not all of it.
+    lever: Option<Expr>,
+    /// The part at its other end; none where that is a motion which an input prescribes.
+    other: Option<&'a Motion<'a>>,
+    /// Where it is, for people.
+    words: String,
+}
+
+impl Finder<'_> {
+    pub(super) fn connections(&self) -> Vec<Slot> {
+        let mut slots = Vec::new();
+        for (i, one) in self.motions.iter().enumerate() {
+            for other in &self.motions[i + 1..] {
+                let (Some(x1), Some(x2)) = (one.x, other.x) else { continue };
+                let units = (self.simulation.unit_of(x1), self.simulation.unit_of(x2));
+                let alike = match &units {
+                    (Some(a), Some(b)) => a.same_dimension(b),
+                    _ => true,
+                };
+                if alike && one.derivative.uses(x2) && other.derivative.uses(x1) {
+                    let ratio = self.ratio(one, x1, x2);
+                    let of = |one: Expr| ratio.as_ref().map_or(one.clone(), |r| r.clone() * one.clone());
+                    let stretch = Stretch {
+                        x: of(Expr::symbol(x1)) - Expr::symbol(x2),
+                        v: of(one.rate()) - other.rate(),
+                        symbol: x2,
+                        sign: 1.0,
+                        lever: ratio.clone(),
+                        other: Some(other),
+                        words: format!("between {x1} and {x2}"),
+                    };
+                    slots.push(self.connection(one, stretch));
+                }
+            }
+        }
+        slots.extend(self.twists());
+        slots.extend(self.bases());
+        slots.extend(self.elements());
+        slots
+    }
+
+    /// Connections of a simulation in relative coordinates, as the drifts of storeys: what the deflection of an element pulls with stands in the
+    /// equations of several coordinates, in a term of that deflection alone.
+    fn elements(&self) -> Vec<Slot> {
+        let element = |one: &Motion<'_>| {
+            let x = one.x?;
+            let spring = |m: &Motion<'_>| {
+                let mut alone = forces_of(self.simulation, m).filter(|(_, t)| t.uses(x));
+                let (sign, term) = alone.next()?;
+                let own = linear_coefficient(self.simulation, term, x)?;
+                alone.next().is_none().then(|| if sign < 0.0 { -own } else { own })
+            };
+            let rate = spring(one)?;
+            let mut pulls = vec![Pull::new(one.v, 1.0)];
+            for other in self.motions.iter().filter(|m| m.v != one.v) {
+                let mut terms = forces_of(self.simulation, other).filter(|(_, t)| t.uses(x));
+                if terms.any(|(_, t)| t.uses(other.v) || other.x.is_some_and(|x2| t.uses(x2))) {
+                    return None;
+                }
+                let Some(there) = spring(other) else { continue };
+                let ratio = quotient(-there, rate.clone());
+                let (sign, ratio) =
+                    if is_negative(&ratio) { (1.0, quotient(-ratio, Expr::Number(1.0))) } else { (-1.0, ratio) };
+                if rate.symbols().iter().any(|s| ratio.uses(s)) {
+                    return None;
+                }
+                let lever = (ratio != Expr::Number(1.0)).then_some(ratio);
+                pulls.push(Pull { lever, ..Pull::new(other.v, sign) });
+            }
+            let [_, other, ..] = &pulls[..] else { return None };
+            let other = self.motions.iter().find(|m| m.v == other.state)?;
+            let stretch = Stretch {
+                x: Expr::symbol(x),
+                v: one.rate(),
+                symbol: x,
+                sign: -1.0,
+                lever: None,
+                other: Some(other),
+                words: format!("in {x}, which pulls at {} coordinates", pulls.len()),
+            };
+            Some(Slot { target: Target::Derivatives(pulls), ..self.connection(one, stretch) })
+        };
+        self.motions.iter().filter_map(element).collect()
+    }
+
+    /// Connections with a motion that an input prescribes, as the ground under a structure: a force that holds a velocity and the rate of the input
+    /// together.
+    fn bases(&self) -> Vec<Slot> {
+        let mut slots = Vec::new();
+        for one in &self.motions {
+            let Some(x) = one.x else { continue };
+            for input in &self.simulation.inputs {
+                let rate = Expr::symbol(&input.symbol).derivative_of_input();
+                let holds_rate = |term: &Expr| {
+                    let mut found = false;
+                    term.visit(&mut |e| found |= *e == rate);
+                    found && term.uses(one.v)
+                };
+                if !one.derivative.uses(x) || !forces_of(self.simulation, one).any(|(_, term)| holds_rate(term)) {
+                    continue;
+                }
+                let stretch = Stretch {
+                    x: Expr::symbol(x) - Expr::symbol(&input.symbol),
+                    v: one.rate() - rate,
+                    symbol: &input.symbol,
+                    sign: 1.0,
+                    lever: None,
+                    other: None,
+                    words: format!("between {x} and {}", input.symbol),
+                };
+                slots.push(self.connection(one, stretch));
+            }
+        }
+        slots
+    }
+
+    /// What a connection takes of the first displacement for each unit of the second where that is not one, as a gear has it: the terms of the
+    /// first part's force that hold the second displacement hold both in that proportion.
+    fn ratio(&self, one: &Motion<'_>, x1: &str, x2: &str) -> Option<Expr> {
+        let mut shared = forces_of(self.simulation, one).filter(|(_, term)| term.uses(x1) && term.uses(x2));
+        let (one, two) = shared.find_map(|(_, t)| Some((coefficient(t, x1)?, coefficient(t, x2)?)))?;
+        let ratio = quotient(-one.simplified(), two.simplified());
+        (ratio != Expr::Number(1.0) && only_parameters(self.simulation, &ratio)).then_some(ratio)
+    }
+
+    /// Connections whose deflection is a state of its own, the velocity of one part less that of another: a shaft's twist, also where it is told
+    /// as the torque or the second part is behind a gear.
+    fn twists(&self) -> Vec<Slot> {
+        let constant = |e: Option<Expr>| {
+            let e = e?.simplified();
+            (!e.has_memory() && only_parameters(self.simulation, &e)).then_some(e)
+        };
+        let twist = |state: &State| {
+            let (name, rate) = (state.name.as_str(), &state.derivative);
+            let felt = |m: &&Motion<'_>| rate.uses(m.v) && m.derivative.uses(name);
+            let mut between = self.motions.iter().filter(felt);
+            let (Some(one), Some(other), None) = (between.next(), between.next(), between.next()) else { return None };
+            let only = |s: &String| s == one.v || s == other.v || s == "pi" || self.simulation.parameter(s).is_some();
+            if !rate.symbols().iter().all(only) {
+                return None;
+            }
+            let [Some(a), Some(b)] = [one, other].map(|m| constant(coefficient(rate, m.v))) else { return None };
+            // The part whose velocity counts positively is the first.
+            let ((one, first), (other, second)) = match (is_negative(&a), is_negative(&b)) {
+                (false, true) => ((one, a), (other, b)),
+                (true, false) => ((other, b), (one, a)),
+                _ => return None,
+            };
+            let ratio = quotient(-first, second);
+            let unit = ratio == Expr::Number(1.0);
+            let stretch = Stretch {
+                x: Expr::symbol(name),
+                v: rate.clone(),
+                symbol: name,
+                sign: -1.0,
+                lever: (!unit).then_some(ratio),
+                other: Some(other),
+                words: format!("across {name}"),
+            };
+            Some(self.connection(one, stretch))
+        };
+        let known = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some());
+        known.filter_map(twist).collect()
+    }
+
+    /// The force between two parts, over the deflection of what connects them.
+    fn connection(&self, one: &Motion<'_>, stretch: Stretch<'_>) -> Slot {
+        let Stretch { x, v, symbol, sign, lever, other, words } = stretch;
+        let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.v, 1.0) }];
+        pulls.extend(other.map(|other| Pull::new(other.v, -1.0)));
+        let mut slot = Slot::new(Place::Connection, format!("state:{}", one.v), words, Target::Derivatives(pulls));
+        slot.loops = self.loops(&v);
+        slot.offer(self.simulation, "x", x);
+        slot.offer(self.simulation, "v", v);
+        let (force, divided) = match force_path(self.simulation, one.derivative) {
+            ForcePath::Quotient(force, _) => (force, None),
+            ForcePath::Divided(mass) => (one.derivative, Some(mass)),
+            ForcePath::Bare => (one.derivative, None),
+        };
+        let whole = |e: Expr| {
+            let e = match divided {
+                Some(mass) => (mass.clone() * e).simplified(),
+                None => e,
+            };
+            quotient(e, lever.clone().unwrap_or(Expr::Number(1.0)))
+        };
+        let held = |t: &Expr| t.uses(symbol) || other.is_some_and(|other| t.uses(other.v));
+        let coupling = force.terms().into_iter().filter(|(_, t)| held(t));
+        if let Some(size) = coupling.map(|(_, t)| t.clone().abs()).reduce(|a, b| a + b) {
+            slot.offer(self.simulation, "F", whole(size));
+        }
+        if let Some(k) = linear_coefficient(self.simulation, force, symbol) {
+            slot.offer(self.simulation, "k", whole(if sign < 0.0 { -k } else { k }));
+        }
+        if let Some(c) = other.and_then(|other| linear_coefficient(self.simulation, force, other.v)) {
+            slot.offer(self.simulation, "c", whole(c));
+        }
+        slot.context = vec![one.derivative.clone()];
+        slot
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::Structure;
+    use super::*;
+
+    /// Displacement, velocity and stiffness of the slots of a kind, with the states that they pull at.
+    pub fn slots(place: Place, states: &[(&str, &str, &str)]) -> Vec<[String; 4]> {
+        let states: String = states
+            .iter()
+            .map(|(name, derivative, unit)| {
+                format!("{name} = {{ derivative = \"{derivative}\", initial = 0.0, unit = \"{unit}\" }}\n")
+            })
+            .collect();
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\nu = \"torque_Nm\"\n[parameters]\nJ = {{ value = 2.0, min = 0.1 }}\nk = {{ value = 50.0, min = 1.0 }}\n\
+             c = {{ value = 0.3, min = 0.0 }}\nn = {{ value = 4.0, fixed = true }}\n[states]\n{states}[outputs]\nspeed_rad_s = \"w2\"\n"
+        );
+        let simulation = Simulation::parse(&text, "test.sim.toml").unwrap();
+        let told = |slot: &Slot| {
+            let of = |symbol: &str| slot.quantity(symbol).map_or(String::new(), |q| q.expression.to_string());
+            let Target::Derivatives(pulls) = &slot.target else { panic!("{}", slot.label) };
+            let pull = |p: &Pull| format!("{}{}", if p.sign > 0.0 { "-" } else { "+" }, p.of(&Expr::symbol(&p.state)));
+            [of("x"), of("v"), of("k"), pulls.iter().map(pull).collect::<Vec<_>>().join(" ")]
+        };
+        Structure::of(&simulation).slots.iter().filter(|s| s.place == place).map(told).collect()
+    }
+
+    #[test]
+    fn what_connects_two_parts_is_found_however_it_is_written() {
+        let check = |states: &[(&str, &str, &str)], expected: [&str; 4]| {
+            assert_eq!(slots(Place::Connection, states), [expected.map(str::to_owned)]);
+        };
+        let (rad, rate) = ("rad", "rad/s");
+        let ends = [("q1", "w1", rad), ("q2", "w2", rad)];
+        let with = |rest: &[(&'static str, &'static str, &'static str)]| [&ends[..], rest].concat();
+        check(
+            &with(&[("w1", "(u - k*(q1 - q2))/J", rate), ("w2", "k*(q1 - q2)/J", rate)]),
+            ["q1 - q2", "w1 - w2", "k", "-w1 +w2"],
+        );
+        check(
+            &with(&[("w1", "(u - k*(q1/n - q2)/n)/J", rate), ("w2", "k*(q1/n - q2)/J", rate)]),
+            ["1/n*q1 - q2", "1/n*w1 - w2", "k", "-1/n*w1 +w2"],
+        );
+        let twisted = |twist, w1, w2| [("z", twist, rad), ("w1", w1, rate), ("w2", w2, rate)];
+        check(&twisted("w1 - w2", "(u - k*z)/J", "k*z/J"), ["z", "w1 - w2", "k", "-w1 +w2"]);
+        check(&twisted("w2 - w1", "(u + k*z)/J", "(-k*z - c*w2)/J"), ["z", "w2 - w1", "k", "-w2 +w1"]);
+        check(&twisted("w1/n - w2", "(u - k*z/n)/J", "k*z/J"), ["z", "w1/n - w2", "k", "-1/n*w1 +w2"]);
+        check(&twisted("k*(w1 - w2)", "(u - z)/J", "(z - c*w2)/J"), ["z", "k*(w1 - w2)", "1", "-w1 +w2"]);
+        let based = [("q2", "w2", rad), ("w2", "(k*(u - q2) + c*(d(u) - w2))/J", rate)];
+        check(&based, ["q2 - u", "w2 - d(u)", "k", "-w2"]);
+        // Drifts of storeys: what an element pulls with stands in the equations of its neighbours.
+        let drifts = [
+            ("d1", "v1", "m"),
+            ("v1", "-u - (k*d1 + c*v1) + (k*d2 + c*v2)", "m/s"),
+            ("d2", "v2", "m"),
+            ("v2", "(k*d1 + c*v1) - 2*(k*d2 + c*v2)", "m/s"),
+            ("w2", "u - c*w2", "rad/s"),
+        ];
+        let found = slots(Place::Connection, &drifts);
+        assert!(found.contains(&["d1", "v1", "k", "-v1 +v2"].map(str::to_owned)), "{found:?}");
+        assert!(found.contains(&["d2", "v2", "2*k", "-v2 +1/2*v1"].map(str::to_owned)), "{found:?}");
+        // A controller's reference is no ground.
+        assert!(slots(Place::Connection, &[based[0], ("w2", "(k*(u - q2) - c*w2)/J", rate)]).is_empty());
+        assert!(slots(Place::Connection, &twisted("w1 + w2", "(u - k*z)/J", "-k*z/J")).is_empty());
+    }
+}
