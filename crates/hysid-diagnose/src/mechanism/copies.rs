@@ -17,12 +17,18 @@ pub(super) fn follow(simulation: &mut Simulation, state: &str, before: &Expr, af
     }
 }
 
-fn renewed(part: Expr, before: &Expr, after: &Expr) -> Expr {
+/// What comes in the place of an expression that is `before`, or that times something.
+pub(super) fn renewed(part: Expr, before: &Expr, after: &Expr) -> Expr {
     use Expr::Binary;
     if part == *before {
         return after.clone();
     }
     match (&part, before, after) {
+        (Binary(BinaryOp::Div, a, b), Binary(BinaryOp::Div, one, below), _)
+            if **one == Expr::Number(1.0) && b == below =>
+        {
+            (**a).clone() * after.clone()
+        }
         (Binary(BinaryOp::Div, a, b), Binary(BinaryOp::Div, force, mass), Binary(BinaryOp::Div, forces, masses))
             if has_factor(a, force) && has_factor(b, mass) =>
         {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hysid_plant::{Expr, Initial, Output, Parameter, Simulation, State, Unit};
 
-use super::copies::follow;
+use super::copies::{follow, renewed};
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
 use super::{Change, Law, Mechanism, Purpose, Role, Start};
@@ -192,7 +192,7 @@ fn separation(
     (at, by): (&str, &str),
     writer: &Writer<'_>,
 ) -> Result<(), String> {
-    let steady = slot.separation().cloned().ok_or("the equations here have no separation")?;
+    let steady = slot.separation().ok_or("the equations here have no separation")?;
     let Some(Expr::Symbol(angle)) = slot.quantity("x").map(|q| q.expression.clone()) else {
         return Err("the angle is no signal of its own".to_owned());
     };
@@ -207,9 +207,7 @@ fn separation(
     }
     // What was put in is not looked through again: it holds the function that it stands for.
     let held = Expr::symbol("?held");
-    simulation.map_equations(|e| {
-        e.map(&mut |part| if part == steady { held.clone() } else { part }).substitute("?held", &by)
-    });
+    simulation.map_equations(|e| e.map(&mut |part| renewed(part, &steady, &held)).substitute("?held", &by));
     Ok(())
 }
 

@@ -237,7 +237,7 @@ impl Slot {
     }
 
     /// The share of attached flow, or of separated flow, that the equations here have as a function of the angle.
-    pub(crate) fn separation(&self) -> Option<&Expr> {
+    pub(crate) fn separation(&self) -> Option<Expr> {
         let Some(Quantity { expression: Expr::Symbol(x), .. }) = self.symbols.get("x") else { return None };
         self.context.iter().find_map(|e| pattern::step_in(e, x))
     }

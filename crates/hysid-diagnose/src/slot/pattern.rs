@@ -45,14 +45,17 @@ pub(super) fn occurs(form: &Expr, expr: &Expr) -> bool {
     found
 }
 
-/// The first part of `expr` that is a smooth step in this symbol, `1/(1 + exp(Z))`, and holds no memory.
-pub(super) fn step_in<'e>(expr: &'e Expr, symbol: &str) -> Option<&'e Expr> {
-    let step = prepare("1/(1 + exp(Z))", |_| None)?;
+/// The smooth step in this symbol, `1/(1 + exp(Z))`, that `expr` holds first, also where something else stands above its line; it holds no memory.
+pub(super) fn step_in(expr: &Expr, symbol: &str) -> Option<Expr> {
+    let form = prepare("1 + exp(Z)", |_| None)?;
     let mut found = None;
-    expr.visit(&mut |e| {
-        if found.is_none() && e.uses(symbol) && matches(&step, e) && !e.has_memory() {
-            found = Some(e);
+    expr.visit(&mut |e| match e {
+        Expr::Binary(BinaryOp::Div, _, below)
+            if found.is_none() && below.uses(symbol) && matches(&form, below) && !below.has_memory() =>
+        {
+            found = Some(Expr::Number(1.0) / (**below).clone());
         }
+        _ => {}
     });
     found
 }

@@ -182,6 +182,14 @@ fn separation_lags_where_the_simulation_has_it() {
     check(Purpose::Refit, &format!("lag({steady}, tau_1)"));
     check(Purpose::Form(Form::Finer), &format!("lag({ahead}, tau_1)"));
     check(Purpose::Screening, &format!("{steady} + w*(lag({ahead}, tau_1) - {steady})"));
+    // An attached and a separated part blended, the one divided by what the other holds the step of.
+    let blended = |step: &str| format!("cna*alpha*{step} + sin(alpha*pi/180)*(1 - {step})");
+    let mut simulation = simulation;
+    let divided = blended(&steady).replacen(&format!("*{steady}"), "/(1 + exp(s*(alpha - a_s)))", 1);
+    simulation.outputs[0].expression = Expr::parse(&divided).unwrap();
+    let slot = mechanism.slots(&Structure::of(&simulation)).remove(0);
+    let written = mechanism.rewrite(&simulation, &slot, &signals, Purpose::Refit).unwrap();
+    assert_eq!(written.simulation.outputs[0].expression.to_string(), blended(&format!("lag({steady}, tau_1)")));
 }
 
 /// Only where the simulation's own damping follows an input do friction and hysteresis follow it.
