@@ -16,6 +16,8 @@ fn every_kind_of_bad_file_is_told() {
     let v = "(u - c*v - k*x)/m";
     let cases: &[(&str, &str, &str, &[&str])] = &[
         ("[time]", "[time", "3:", &["not TOML"]),
+        ("u = \"force_N\"", "u = force_N", "7:", &["not TOML", "in quotes"]),
+        ("initial = 0.0, unit = \"m\"", "initial = free, unit = \"m\"", "", &["not TOML", "in quotes"]),
         ("title = \"Oscillator\"", "title = 3", "1:9", &["`title`", "a text in quotes", "integer"]),
         ("title", "titel", "1:1", &["`titel`", "unknown key", "title"]),
         ("period_s = 0.01", "period = 0.01", "4:1", &["`time.period`", "unknown key", "period_s"]),

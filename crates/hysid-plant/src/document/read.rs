@@ -231,6 +231,14 @@ fn place(text: &str, offset: usize) -> Place {
     }
 }
 
+/// A message of the TOML reader, which takes a word without quotes for the beginning of `true` or `false`.
+fn told(message: &str) -> String {
+    if message.contains("boolean") || message.contains("quoted") {
+        return "a text stands in quotes, as in \"free\" or \"-k*x\"".to_owned();
+    }
+    message.trim().replace('\n', "; ")
+}
+
 impl Simulation {
     /// The simulation that a `.sim.toml` file's text stands for; `file_name` is for messages only.
     ///
@@ -247,7 +255,7 @@ impl Simulation {
             file: file.clone(),
             place: e.span().map(|span| place(text, span.start)),
             key: String::new(),
-            kind: ErrorKind::Toml(e.message().trim().replace('\n', "; ")),
+            kind: ErrorKind::Toml(told(e.message())),
         })?;
         let mut reader = Reader { spans: HashMap::new() };
         let simulation = read(&mut reader, root.get_ref());
