@@ -145,6 +145,12 @@ impl Need {
         }
     }
 
+    /// Whether a recording that meets it shows by itself that something of this kind is there: such a law is tried however little it promises around a
+    /// simulation whose parameters were led astray.
+    pub fn is_telling(&self) -> bool {
+        matches!(self, Self::Simulated(_))
+    }
+
     /// The need in words, for the catalogue.
     pub fn describe(&self) -> String {
         match *self {

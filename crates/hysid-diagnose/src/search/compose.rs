@@ -11,7 +11,8 @@ use crate::budget::Step;
 use crate::mechanism::Mechanism;
 use crate::model::hypothesis::{Effect, Hypothesis, Key, Setting};
 
-/// The candidates worth a refit: the best by score, at most `most`, and one for each slot and family that is not far behind.
+/// The candidates worth a refit: the best by score, at most `most`, one for each slot and family that is not far behind, and what the recording shows
+/// by itself.
 pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
     let Some(top) = candidates.first().map(Candidate::score) else { return Vec::new() };
     let mut list: Vec<&Candidate> = Vec::new();
@@ -30,6 +31,7 @@ pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
             }
         }
     }
+    candidates.iter().filter(|c| c.is_shown()).for_each(|c| include(&mut list, c));
     list
 }
 

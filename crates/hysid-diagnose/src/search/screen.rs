@@ -72,6 +72,11 @@ impl Candidate {
         vec![(self.mechanism.id, self.slot.label.clone())]
     }
 
+    /// Whether the recording shows by itself that something of this kind is there.
+    pub fn is_shown(&self) -> bool {
+        self.lacking.is_none() && self.mechanism.needs.iter().any(|n| n.is_telling())
+    }
+
     /// Its largest score.
     pub fn score(&self) -> f64 {
         self.points.first().map_or(f64::NEG_INFINITY, |p| p.score)
@@ -264,4 +269,45 @@ pub fn rewrite_at(
     let slot = structure.slots.iter().find(|s| s.label == label && mechanism.places.contains(&s.place))?.clone();
     let written = mechanism.rewrite(document, &slot, at[place].as_ref()?, purpose).ok()?;
     Some((written, slot))
+}
+
+#[cfg(test)]
+#[path = "../../tests/common/oscillator.rs"]
+mod oscillator;
+
+#[cfg(test)]
+mod tests {
+    use hysid_signal::{Channel, Clock, Recording};
+
+    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
+    use super::*;
+    use crate::budget::Budget;
+    use crate::data::DataSet;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::calibrated;
+    use crate::search::compose::short_list;
+
+    /// Whether a sensor that is blind to the sign is tried, of a list of one, where the recording is this of the oscillator's displacement.
+    fn blind_sensor_is_tried(sensor: impl Fn(f64) -> f64) -> bool {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let u = drive(600, &mut normal(4));
+        let y = respond(&u, REAL, |x, _| 2e5 * x.powi(3)).into_iter().map(sensor).collect();
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let wanted = ["rectified_output", "cubic_stiffness", "quintic_stiffness"];
+        let evidence = none.base.evidence();
+        let mut found = screen(&none.base, &setting.original, &[], &evidence, &|m, _| wanted.contains(&m.id));
+        // However little it promises.
+        found.sort_by_key(|c| c.mechanism.id == "rectified_output");
+        short_list(&found, 1).iter().any(|c| c.mechanism.id == "rectified_output" && c.is_shown())
+    }
+
+    #[test]
+    fn what_the_recording_shows_by_itself_is_tried() {
+        assert!(blind_sensor_is_tried(f64::abs));
+        assert!(!blind_sensor_is_tried(|x| x));
+    }
 }
