@@ -272,6 +272,7 @@ pub fn rewrite_at(
 }
 
 #[cfg(test)]
+#[allow(dead_code)] // Its recordings are without noise here.
 #[path = "../../tests/common/oscillator.rs"]
 mod oscillator;
 
