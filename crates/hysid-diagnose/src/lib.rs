@@ -44,6 +44,10 @@ mod request;
 mod search;
 mod text;
 
+#[cfg(test)]
+#[path = "../tests/common/oscillator.rs"]
+mod oscillator;
+
 pub use answer::bootstrap::{Ratio, ratio_of_rms, rms};
 pub use column::{StandIn, stand_in};
 pub use data::{DataSet, Stretch, held_out_blocks};

@@ -164,9 +164,9 @@ mod tests {
     use crate::model::Values;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::calibrated;
+    use crate::oscillator::{normal, rms};
     use crate::search::fitting::refit;
     use crate::search::screen::screen;
-    use crate::verdict::weigh::oscillator::{normal, rms};
 
     fn data(text: &str, u: Vec<f64>, y: Vec<f64>, period_s: f64) -> (Simulation, DataSet) {
         let original = Simulation::parse(text, "test.sim.toml").unwrap();

@@ -86,7 +86,7 @@ pub fn best_that_says(pool: &[Hypothesis<'_>], key: &Key) -> Option<usize> {
 }
 
 /// The same of sets by statement and evidence.
-fn best_place(sets: &[(Key, f64)], key: &Key) -> Option<usize> {
+pub fn best_place(sets: &[(Key, f64)], key: &Key) -> Option<usize> {
     (0..sets.len()).filter(|&i| sets[i].0 == *key).max_by(|&a, &b| sets[a].1.total_cmp(&sets[b].1))
 }
 
@@ -180,6 +180,15 @@ impl<'d> Setting<'d> {
         let further = base.model.count().beyond(self.own_unknowns);
         base.log_likelihood - self.noise.price(self.own_unknowns.lasting, further, self.data.rows())
     }
+}
+
+/// For tests: a recording of an input and an output, as data of a simulation.
+#[cfg(test)]
+pub fn recorded(simulation: &Simulation, period_s: f64, columns: [(&str, Vec<f64>); 2]) -> DataSet {
+    use hysid_signal::{Channel, Clock, Recording};
+    let channels = columns.map(|(name, samples)| Channel { name: name.into(), samples }).into();
+    let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s }, channels).unwrap();
+    DataSet::new(simulation, &[recording], 3).unwrap()
 }
 
 /// For tests: a simulation calibrated on a data set from its own values, and what its fits share.

@@ -66,20 +66,15 @@ pub fn slope(y: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(dead_code)] // Only its simulation is asked for here.
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
     use hysid_signal::{Channel, Clock, Recording};
 
-    use super::oscillator::{BASELINE, PERIOD, drive, normal};
     use super::*;
     use crate::data::DataSet;
     use crate::evidence::{NoiseModel, Whitener, norm2};
     use crate::model::Model;
+    use crate::oscillator::{BASELINE, PERIOD, drive, normal};
     use crate::refit::{LmOptions, Problem, levenberg_marquardt};
 
     /// The oscillator with a small resonator on it, which no output shows.

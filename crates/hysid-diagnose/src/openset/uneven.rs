@@ -120,19 +120,15 @@ fn bayes_factor(score: f64, information: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
     use hysid_signal::{Channel, Clock, Recording};
 
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::budget::Budget;
     use crate::data::DataSet;
     use crate::model::hypothesis::calibrated;
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
 
     /// What an oscillator with dry friction, whose level is multiplied by a function of the position, looks like to a simulation that has dry friction.
     fn found(seed: u64, factor: fn(f64) -> f64, noise: f64) -> Uneven {

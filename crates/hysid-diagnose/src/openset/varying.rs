@@ -233,10 +233,6 @@ fn judged(
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 pub(crate) mod tests {
     use std::cell::Cell;
     use std::f64::consts::TAU;
@@ -244,13 +240,13 @@ pub(crate) mod tests {
     use hysid_plant::Simulation;
     use hysid_signal::{Channel, Clock, Recording};
 
-    pub use super::oscillator::BASELINE;
-    use super::oscillator::{PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::data::DataSet;
     use crate::model::base::{Start, fit_simulation};
     use crate::model::{Model, Values};
     use crate::openset::written::with_oscillation;
+    pub use crate::oscillator::BASELINE;
+    use crate::oscillator::{PERIOD, REAL, drive, normal, respond, rms};
     use crate::refit::LmOptions;
 
     /// An oscillator whose stiffness is multiplied by a function of the time, with white noise of this share of the output.

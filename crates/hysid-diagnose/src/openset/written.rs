@@ -213,20 +213,16 @@ fn degree(e: &Expr, symbol: &str) -> usize {
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 mod tests {
     use hysid_signal::{Channel, Clock, Recording};
 
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::data::DataSet;
     use crate::evidence::{dot, norm2};
     use crate::model::base::{NoiseKind, Start, fit_simulation};
     use crate::model::{Model, Values};
     use crate::openset::terms::terms;
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::refit::LmOptions;
 
     #[test]

@@ -282,19 +282,15 @@ fn fitted_key(h: &Hypothesis<'_>) -> Key {
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
     use hysid_signal::{Channel, Clock, Recording};
 
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::budget::Budget;
     use crate::data::DataSet;
     use crate::model::hypothesis::calibrated;
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
 
     /// What may have been absorbed, and the largest score of the same under the noise model's own eyes, where this is added to an oscillator's
     /// output, in multiples of white noise, by the time in seconds.

@@ -179,20 +179,16 @@ pub fn by_rehearsal(
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
     use hysid_signal::{Channel, Clock, Recording};
     use proptest::prelude::*;
 
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::budget::Budget;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::calibrated;
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::search::screen::screen;
 
     proptest! {

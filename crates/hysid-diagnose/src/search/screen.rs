@@ -272,20 +272,12 @@ pub fn rewrite_at(
 }
 
 #[cfg(test)]
-#[allow(dead_code)] // Its recordings are without noise here.
-#[path = "../../tests/common/oscillator.rs"]
-mod oscillator;
-
-#[cfg(test)]
 mod tests {
-    use hysid_signal::{Channel, Clock, Recording};
-
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
     use super::*;
     use crate::budget::Budget;
-    use crate::data::DataSet;
     use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::calibrated;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
     use crate::search::compose::short_list;
 
     /// Whether a sensor that is blind to the sign is tried, of a list of one, where the recording is this of the oscillator's displacement.
@@ -293,9 +285,7 @@ mod tests {
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let u = drive(600, &mut normal(4));
         let y = respond(&u, REAL, |x, _| 2e5 * x.powi(3)).into_iter().map(sensor).collect();
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
-        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let wanted = ["rectified_output", "cubic_stiffness", "quintic_stiffness"];

@@ -25,13 +25,23 @@ pub(super) fn coefficient(expr: &Expr, symbol: &str) -> Option<Expr> {
     }
 }
 
+/// The coefficient of `symbol` in an expression that is linear in it, where it is made of parameters only.
+pub(super) fn constant_coefficient(simulation: &Simulation, expr: &Expr, symbol: &str) -> Option<Expr> {
+    let c = coefficient(expr, symbol)?.simplified();
+    (!c.has_memory() && only_parameters(simulation, &c)).then_some(c)
+}
+
+/// A factor where it is not one.
+pub(super) fn unless_one(factor: Expr) -> Option<Expr> {
+    (factor != Expr::Number(1.0)).then_some(factor)
+}
+
 /// The sum of the constant coefficients of `symbol` over the terms of a sum; terms that are not linear in it are left out.
 /// `None` where no term is linear in it with a coefficient of parameters only.
 pub(crate) fn linear_coefficient(simulation: &Simulation, expr: &Expr, symbol: &str) -> Option<Expr> {
-    let constant = |c: &Expr| !c.has_memory() && only_parameters(simulation, c);
     let found = expr.terms().into_iter().filter_map(|(sign, term)| {
-        let c = coefficient(term, symbol)?.simplified();
-        constant(&c).then_some(if sign < 0.0 { -c } else { c })
+        let c = constant_coefficient(simulation, term, symbol)?;
+        Some(if sign < 0.0 { -c } else { c })
     });
     found.reduce(|a, b| a + b).map(|c| c.simplified())
 }

@@ -2,9 +2,9 @@
 
 use hysid_plant::{Expr, Simulation, State};
 
-use super::algebra::{coefficient, linear_coefficient, only_parameters, quotient};
+use super::algebra::{coefficient, constant_coefficient, linear_coefficient, only_parameters, quotient, unless_one};
 use super::find::Finder;
-use super::motion::{ForcePath, Motion, force_path};
+use super::motion::{Motion, force_of};
 use super::{Place, Pull, Slot, Target};
 
 /// Whether a product is told with a minus.
@@ -18,11 +18,7 @@ fn is_negative(product: &Expr) -> bool {
 
 /// The terms of the force on a part, each with its sign.
 fn forces_of<'e>(simulation: &Simulation, motion: &Motion<'e>) -> impl Iterator<Item = (f64, &'e Expr)> {
-    let force = match force_path(simulation, motion.derivative) {
-        ForcePath::Quotient(force, _) => force,
-        _ => motion.derivative,
-    };
-    force.terms().into_iter()
+    force_of(simulation, motion.derivative).0.terms().into_iter()
 }
 
 /// What connects two parts.
@@ -101,8 +97,7 @@ impl Finder<'_> {
                 if rate.symbols().iter().any(|s| ratio.uses(s)) {
                     return None;
                 }
-                let lever = (ratio != Expr::Number(1.0)).then_some(ratio);
-                pulls.push(Pull { lever, ..Pull::new(other.v, sign) });
+                pulls.push(Pull { lever: unless_one(ratio), ..Pull::new(other.v, sign) });
             }
             let [_, other, ..] = &pulls[..] else { return None };
             let other = self.motions.iter().find(|m| m.v == other.state)?;
@@ -157,16 +152,12 @@ impl Finder<'_> {
         let mut shared = forces_of(self.simulation, one).filter(|(_, term)| term.uses(x1) && term.uses(x2));
         let (one, two) = shared.find_map(|(_, t)| Some((coefficient(t, x1)?, coefficient(t, x2)?)))?;
         let ratio = quotient(-one.simplified(), two.simplified());
-        (ratio != Expr::Number(1.0) && only_parameters(self.simulation, &ratio)).then_some(ratio)
+        unless_one(ratio).filter(|ratio| only_parameters(self.simulation, ratio))
     }
 
     /// Connections whose deflection is a state of its own, the velocity of one part less that of another: a shaft's twist, also where it is told
     /// as the torque or the second part is behind a gear.
     fn twists(&self) -> Vec<Slot> {
-        let constant = |e: Option<Expr>| {
-            let e = e?.simplified();
-            (!e.has_memory() && only_parameters(self.simulation, &e)).then_some(e)
-        };
         let twist = |state: &State| {
             let (name, rate) = (state.name.as_str(), &state.derivative);
             let felt = |m: &&Motion<'_>| rate.uses(m.v) && m.derivative.uses(name);
@@ -176,21 +167,20 @@ impl Finder<'_> {
             if !rate.symbols().iter().all(only) {
                 return None;
             }
-            let [Some(a), Some(b)] = [one, other].map(|m| constant(coefficient(rate, m.v))) else { return None };
+            let coefficients = [one, other].map(|m| constant_coefficient(self.simulation, rate, m.v));
+            let [Some(a), Some(b)] = coefficients else { return None };
             // The part whose velocity counts positively is the first.
             let ((one, first), (other, second)) = match (is_negative(&a), is_negative(&b)) {
                 (false, true) => ((one, a), (other, b)),
                 (true, false) => ((other, b), (one, a)),
                 _ => return None,
             };
-            let ratio = quotient(-first, second);
-            let unit = ratio == Expr::Number(1.0);
             let stretch = Stretch {
                 x: Expr::symbol(name),
                 v: rate.clone(),
                 symbol: name,
                 sign: -1.0,
-                lever: (!unit).then_some(ratio),
+                lever: unless_one(quotient(-first, second)),
                 other: Some(other),
                 words: format!("across {name}"),
             };
@@ -209,11 +199,7 @@ impl Finder<'_> {
         slot.loops = self.loops(&v);
         slot.offer(self.simulation, "x", x);
         slot.offer(self.simulation, "v", v);
-        let (force, divided) = match force_path(self.simulation, one.derivative) {
-            ForcePath::Quotient(force, _) => (force, None),
-            ForcePath::Divided(mass) => (one.derivative, Some(mass)),
-            ForcePath::Bare => (one.derivative, None),
-        };
+        let (force, divided) = force_of(self.simulation, one.derivative);
         let whole = |e: Expr| {
             let e = match divided {
                 Some(mass) => (mass.clone() * e).simplified(),

@@ -3,7 +3,7 @@
 use hysid_plant::{Expr, Function, Memory, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
-use super::motion::{ForcePath, Kinematic, Motion, force_path, kinematic, motions};
+use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
 use super::{OWN_VELOCITY, Place, Pull, Sensed, Slot, Target, sensed};
 
 /// What a simulation is made of, as far as mechanisms care.
@@ -132,14 +132,13 @@ impl Finder<'_> {
                 slot.offer(self.simulation, "v", Expr::symbol(motion.v));
             }
             let into = self.simulation.states.iter().filter(|s| s.derivative.uses(symbol));
-            slot.constant = into.into_iter().any(|s| match force_path(self.simulation, &s.derivative) {
-                ForcePath::Quotient(force, _) => has_free_constant(self.simulation, force),
-                _ => has_free_constant(self.simulation, &s.derivative),
-            }) || self
-                .simulation
-                .outputs
-                .iter()
-                .any(|o| o.expression.uses(symbol) && has_free_constant(self.simulation, &o.expression));
+            let forced = |s: &State| has_free_constant(self.simulation, force_of(self.simulation, &s.derivative).0);
+            slot.constant = into.into_iter().any(forced)
+                || self
+                    .simulation
+                    .outputs
+                    .iter()
+                    .any(|o| o.expression.uses(symbol) && has_free_constant(self.simulation, &o.expression));
             slots.push(slot);
         }
         slots

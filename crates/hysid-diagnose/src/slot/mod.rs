@@ -3,10 +3,11 @@
 //! A state `x` whose derivative is exactly the state `v` is a displacement with its velocity, and the derivative of `v` holds
 //! the force. Where that derivative is a quotient `(...)/m` by parameters, forces enter above the line and have the unit of a
 //! force; else they have the unit of the derivative. Two displacements that appear in each other's force are connected, and a
-//! law can stand between them, also over a gear; so are two velocities whose difference, but for factors, is the derivative of a state that both
-//! feel. A displacement may also be a multiple of the integral of its velocity (`1000*v`, or `p/m` of a momentum). A state without a partner
-//! whose unit is a speed is a velocity without its displacement; any other is a store. A simulation without states is a static relation: its force laws stand at the output, over the inputs
-//! that are a displacement or a velocity by their unit or name (where there is only a displacement, the velocity is `d(x)`).
+//! law can stand between them, also over a gear; so are two velocities whose difference, but for factors, is the derivative of
+//! a state that both feel. A displacement may also be a multiple of the integral of its velocity (`1000*v`, or `p/m` of a
+//! momentum). A state without a partner whose unit is a speed is a velocity without its displacement; any other is a store. A
+//! simulation without states is a static relation: its force laws stand at the output, over the inputs that are a displacement
+//! or a velocity by their unit or name (where there is only a displacement, the velocity is `d(x)`).
 //! Where one part of a simulation drives another and nothing comes back, what it passes on is an input of the second; where that is a sum
 //! of several states, the sum is.
 

@@ -2,7 +2,7 @@
 
 use hysid_plant::{BinaryOp, Expr, Simulation, State, Unit};
 
-use super::algebra::{coefficient, only_parameters};
+use super::algebra::{constant_coefficient, only_parameters};
 
 /// How forces enter the derivative of a velocity.
 pub(crate) enum ForcePath<'a> {
@@ -33,6 +33,15 @@ pub(crate) fn force_path<'a>(simulation: &Simulation, derivative: &'a Expr) -> F
             ForcePath::Divided(mass)
         }
         _ => ForcePath::Bare,
+    }
+}
+
+/// The sum of the forces in a derivative, and the mass by which each of its terms is divided where they are not divided as a whole.
+pub(super) fn force_of<'a>(simulation: &Simulation, derivative: &'a Expr) -> (&'a Expr, Option<&'a Expr>) {
+    match force_path(simulation, derivative) {
+        ForcePath::Quotient(force, _) => (force, None),
+        ForcePath::Divided(mass) => (derivative, Some(mass)),
+        ForcePath::Bare => (derivative, None),
     }
 }
 
@@ -106,8 +115,7 @@ fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Ex
     {
         return None;
     }
-    let scale = coefficient(&position.derivative, velocity)?.simplified();
-    (!scale.has_memory() && only_parameters(simulation, &scale)).then_some(scale)
+    constant_coefficient(simulation, &position.derivative, velocity)
 }
 
 pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> Vec<Motion<'a>> {

@@ -7,7 +7,7 @@ use super::wanders::{Wanders, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
-use crate::model::hypothesis::{Effect, Hypothesis, best_that_says, block_score};
+use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::explore::Explored;
 use crate::search::leaves_more;
@@ -141,8 +141,8 @@ impl<'d> Judgement<'d> {
     pub fn steady(&self, pool: &[Hypothesis<'_>]) -> usize {
         let best = &pool[self.winner];
         let key = best.key_of(|i| self.wandering[i].as_ref().is_none_or(|w| w.probability <= LIKELY));
-        let gain = |i: usize| pool[i].log_evidence - pool[0].log_evidence;
-        best_that_says(pool, &key).filter(|&i| gain(i) > STEADY * gain(self.winner)).unwrap_or(0)
+        let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence - pool[0].log_evidence)).collect();
+        place_of(&sets, &key, STEADY * sets[self.winner].1)
     }
 
     /// What most likely varies in the place of a member of the winner, in words, where that is likelier than the member.
@@ -155,6 +155,11 @@ impl<'d> Judgement<'d> {
     pub fn contest<'a>(&'a self, pool: &'a [Hypothesis<'d>]) -> Contest<'a, 'd> {
         Contest { pool, weighed: &self.weighed, probability: &self.probability, winner: self.winner }
     }
+}
+
+/// The place of the best set that makes this statement, of sets by statement and gain; the first where it gains no more than the least.
+fn place_of(sets: &[(Key, f64)], key: &Key, least: f64) -> usize {
+    best_place(sets, key).filter(|&i| sets[i].1 > least).unwrap_or(0)
 }
 
 /// What speaks against writing a set into the simulation, in words; `least` is the simulation as it is with the least error.
@@ -189,4 +194,20 @@ fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String
         Some(format!("{id}: for a firm answer the recording lacks something: {lacking}"))
     };
     best.effects.iter().map(told).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_members_that_stay_are_written_where_they_bring_enough() {
+        let key = |ids: &[&'static str]| -> Key { ids.iter().map(|id| (*id, String::new())).collect() };
+        let sets =
+            [(key(&[]), 0.0), (key(&["a"]), 55.0), (key(&["b"]), 90.0), (key(&["a"]), 60.0), (key(&["a", "b"]), 100.0)];
+        assert_eq!(place_of(&sets, &key(&["a"]), 50.0), 3);
+        assert_eq!(place_of(&sets, &key(&["a"]), 70.0), 0);
+        assert_eq!(place_of(&sets, &key(&["c"]), 50.0), 0);
+        assert_eq!(place_of(&sets, &key(&[]), 50.0), 0);
+    }
 }

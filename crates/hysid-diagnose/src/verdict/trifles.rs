@@ -58,17 +58,14 @@ fn named(e: &Effect) -> String {
 
 #[cfg(test)]
 mod tests {
-    use hysid_plant::Simulation;
-    use hysid_signal::{Channel, Clock, Recording};
-
-    use super::super::weigh::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::budget::Budget;
-    use crate::data::DataSet;
     use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::calibrated;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::search::fitting::refit;
     use crate::search::screen::screen;
+    use hysid_plant::Simulation;
 
     /// Of a hard spring and an offset of the sensor of so many noise standard deviations, what is told, and how many of them are not.
     fn told(offset: f64) -> (Vec<&'static str>, usize) {
@@ -78,9 +75,7 @@ mod tests {
         let mut y = respond(&u, REAL, |x, _| 6e4 * x.powi(3));
         let noise = 0.01 * rms(&y);
         y.iter_mut().for_each(|y| *y += noise * (random() + offset));
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
-        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let fitted = |parent: &Hypothesis<'_>, id: &str| {

@@ -246,22 +246,15 @@ pub fn log_weights(
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/oscillator.rs"]
-pub(crate) mod oscillator;
-
-#[cfg(test)]
 mod tests {
-    use hysid_plant::Simulation;
-    use hysid_signal::{Channel, Clock, Recording};
-
-    use super::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use super::*;
     use crate::budget::Budget;
-    use crate::data::DataSet;
     use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::calibrated;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::search::fitting::refit;
     use crate::search::screen::screen;
+    use hysid_plant::Simulation;
 
     #[test]
     fn blocks_veto_what_they_refute_and_not_what_they_do_not_show() {
@@ -284,9 +277,7 @@ mod tests {
         let mut y = respond(&u, REAL, |_, _| 0.0);
         let noise = 0.02 * rms(&y);
         y.iter_mut().for_each(|y| *y += noise * (random() + 0.1));
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
-        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let wanted = ["input_offset", "output_offset", "cubic_stiffness"];
