@@ -13,7 +13,7 @@ mod expr;
 mod number;
 mod unit;
 
-pub use calibrate::{Calibration, CalibrationError, Data, Effort, Flag, INITIAL_SHARE, NoiseModel, Settings};
+pub use calibrate::{Calibration, CalibrationError, Data, Effort, Flag, INITIAL_SHARE, Settings};
 pub use document::{ClockSource, Hold, Initial, Input, LARGEST_FILE, Output, Parameter, Simulation, State, Time};
 pub use engine::{
     Compiled, DataError, Direction, Drive, Injection, Linearisation, Observer, Response, Run, Sensitivity, Slot, Start,

@@ -1,8 +1,10 @@
-//! The in-memory recording and what can be said of a signal without a model: excitations, spectra, turning points.
+//! The in-memory recording and what can be said of a signal without a model: excitations, spectra, the colour of a noise, turning
+//! points.
 //!
 //! A [`Recording`] is a table of named channels on one uniform clock. A missing sample is `NaN`; [`Recording::segments`]
 //! gives the stretches without one. There are no files here (see `hysid-io`) and no models.
 
+mod autoregression;
 mod excitation;
 mod noise;
 mod recording;
@@ -10,6 +12,7 @@ mod spectrum;
 pub mod tell;
 mod turning_points;
 
+pub use autoregression::Autoregression;
 pub use excitation::{Excitation, ExcitationError, modulate};
 pub use noise::{NoiseError, autoregressive_noise, variance_for_snr, white_noise};
 pub use recording::{Channel, Clock, Recording, RecordingError, Segment};

@@ -20,6 +20,7 @@ mod sindy;
 mod stats;
 mod trial;
 mod verdict;
+mod visible;
 
 use std::ops::Range;
 use std::path::PathBuf;

@@ -8,7 +8,7 @@ use hysid_report::figure::{Mark, Plot, Tone};
 use hysid_report::page::{Align, Page, Table};
 
 use super::rivals::PATIENCE;
-use super::score::{CELLS, Line, Row, Score, Standing, shared};
+use super::score::{CELLS, Cell, Line, Row, Score, Standing, shared};
 use super::stats::quantile;
 use super::verdict::Verdict;
 
@@ -64,20 +64,24 @@ fn table(text: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<St
     text.push('\n');
 }
 
-fn difficulty(score: &Score) -> Vec<Vec<String>> {
-    score
-        .cells
-        .iter()
-        .map(|(dnr, n, hits, fall, over)| {
-            let mut row = vec![format!("{dnr}"), n.to_string()];
-            row.extend(hits.iter().map(|h| number(*h as f64 / *n as f64, true)));
-            row.extend([number(*fall, false), number(*over, false)]);
+fn gathered(list: &[Cell]) -> Vec<Vec<String>> {
+    list.iter()
+        .map(|c| {
+            let mut row = vec![format!("{}", c.at), c.n.to_string()];
+            row.extend(c.hits.iter().map(|h| number(*h as f64 / c.n as f64, true)));
+            row.extend([number(c.fall, false), number(c.over_oracle, false)]);
             row
         })
         .collect()
 }
 
-const DIFFICULTY: [&str; 8] = ["DNR", "n", "detected", "family", "mechanism", "slot", "after/before", "after/oracle"];
+/// The head of a table of single effects that were gathered by this.
+fn gathered_by(what: &str) -> [&str; 8] {
+    [what, "n", "detected", "family", "mechanism", "slot", "after/before", "after/oracle"]
+}
+
+const SEEN: &str = "nats from";
+const SEEN_MEANS: &str = "Single effects by the log likelihood ratio that the exact law with its true parameters has over the best baseline: what can be seen at most.";
 
 /// How long a diagnosis takes, from the seconds of each.
 pub fn times(seconds: &[f64]) -> String {
@@ -107,7 +111,9 @@ pub fn markdown(score: &Score, command: &str, took: f64, rows: &[Row]) -> String
     );
     lines(&mut text, &score.lines);
     text.push_str("By difficulty, single effects:\n\n");
-    table(&mut text, &DIFFICULTY, difficulty(score));
+    table(&mut text, &gathered_by("DNR"), gathered(&score.cells));
+    let _ = writeln!(text, "{SEEN_MEANS}\n");
+    table(&mut text, &gathered_by(SEEN), gathered(&score.seen));
     text.push_str("Median held-out error over that of the recalibrated simulation, effects of the catalogue:\n\n");
     table(
         &mut text,
@@ -171,13 +177,14 @@ pub fn cases(rows: &[Row]) -> String {
         };
         let _ = writeln!(
             text,
-            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} linear={:.3} own={:?}/{:?} sep={:?} {:.1}s{}",
+            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} seen={:.0} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} linear={:.3} own={:?}/{:?} sep={:?} {:.1}s{}",
             r.label.id,
             r.label.group,
             r.label.plant,
             r.label.excitation,
             r.label.samples,
             r.label.dnr,
+            r.rivals.visible,
             r.label.noise.name(),
             100.0 * r.label.noise_level,
             truth.join(" + "),
@@ -230,7 +237,7 @@ pub fn html(score: &Score, command: &str, took: f64, rows: &[Row]) -> String {
     page.section("Targets", "");
     page.table(&tabled(&HEAD, score.lines.iter().map(cells).collect()));
     page.section("By difficulty", "Single effects. DNR: what the best baseline leaves, over the noise.");
-    page.table(&tabled(&DIFFICULTY, difficulty(score)));
+    page.table(&tabled(&gathered_by("DNR"), gathered(&score.cells)));
     let mut plot = Plot::new("log10 of the difficulty DNR", "share right");
     for (i, (name, tone)) in
         [("detected", Tone::Other), ("family", Tone::Before), ("mechanism", Tone::After)].into_iter().enumerate()
@@ -239,12 +246,14 @@ pub fn html(score: &Score, command: &str, took: f64, rows: &[Row]) -> String {
             .cells
             .iter()
             .zip(CELLS)
-            .filter(|(c, _)| c.1 > 0)
-            .map(|(c, dnr)| (dnr.log10(), c.2[i] as f64 / c.1 as f64))
+            .filter(|(c, _)| c.n > 0)
+            .map(|(c, dnr)| (dnr.log10(), c.hits[i] as f64 / c.n as f64))
             .collect();
         plot = plot.with(name, tone, Mark::Line, points);
     }
     page.figure(plot.svg(), "Share of single effects detected, and with the right family and mechanism.");
+    page.section("By what can be seen", SEEN_MEANS);
+    page.table(&tabled(&gathered_by(SEEN), gathered(&score.seen)));
     let diagonal = vec![(0.0, 0.0), (1.0, 1.0)];
     let reliability = Plot::new("probability stated", "share right")
         .with("perfect", Tone::Faint, Mark::Line, diagonal)

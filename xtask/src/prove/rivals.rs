@@ -17,6 +17,7 @@ use super::free_run::{distance, error};
 use super::linear;
 use super::sindy;
 use super::trial::Bench;
+use super::visible::visible;
 
 /// Errors of the competitors on one case.
 #[derive(Debug, Clone)]
@@ -37,6 +38,8 @@ pub struct Rivals {
     pub narx: Errors,
     /// NARX on what the recalibrated baseline leaves.
     pub narx_on_residual: Errors,
+    /// Log likelihood ratio of the truth over the best baseline, in nats ([`visible`]).
+    pub visible: f64,
     /// For a law outside the catalogue: squared distance in units of the noise to the best law inside, after its refit.
     pub separation: Option<f64>,
 }
@@ -78,6 +81,7 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
         sindy: sindy::discrepancy(case, &calibrated).map(|m| error(case, &m, &case.val)),
         narx: if short { bench.narx(case) } else { unknown },
         narx_on_residual: if short { bench.narx_on_residual(case, &calibrated) } else { unknown },
+        visible: visible(case),
         separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
     }
 }

@@ -18,7 +18,7 @@ use hysid_plant::Drive;
 
 use crate::evidence::{Layout, Series, norm2};
 
-use thinning::{step, thin};
+use thinning::{step, thin, together};
 pub use windows::held_out_blocks;
 
 /// Gaps cut a recording into stretches; shorter ones than this are left out.
@@ -192,6 +192,10 @@ impl DataSet {
     pub fn own_step(&self) -> usize {
         let outputs = || self.stretches.iter().flat_map(|s| s.outputs.iter().map(Vec::as_slice));
         let wanted = step(outputs(), self.period_s, self.samples());
+        let fed_back = |s: &Stretch| s.drive.inputs().iter().any(|u| s.outputs.iter().any(|y| together(u, y, wanted)));
+        if wanted > 1 && self.stretches.iter().any(fed_back) {
+            return 1;
+        }
         // Between gaps there must be rows enough: what is too short for a series is left out.
         let lengths: Vec<usize> =
             outputs().flat_map(|y| runs(y.iter().map(|v| v.is_finite()))).map(|r| r.len()).collect();

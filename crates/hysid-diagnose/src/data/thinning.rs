@@ -34,6 +34,26 @@ pub fn step<'a>(signals: impl Iterator<Item = &'a [f64]>, period_s: f64, samples
     by_band.min(samples / LEAST_ROWS).max(1)
 }
 
+/// Samples of a segment of the spectra by which feedback is seen, and the mean coherence beyond which it is.
+const SEGMENT: usize = 128;
+const COHERENT: f64 = 0.5;
+
+/// Whether input and output move together above the frequencies that rows of `step` samples resolve.
+///
+/// A controller behind the recorded input answers the noise of the sensor: of two samples in one row the input at the first says what the noise
+/// of both was. Rows would know the noise beforehand, and any fast path from the input to the output would predict it. Where nothing is coherent, as in
+/// an open loop whose output is noise up there, nothing is lost by means.
+pub fn together(u: &[f64], y: &[f64], step: usize) -> bool {
+    // Missing samples: no power where nothing was recorded.
+    let filled = |s: &[f64]| -> Vec<f64> { s.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect() };
+    let Ok(spectrum) = hysid_signal::cross_spectrum(&filled(u), &filled(y), 1.0, SEGMENT) else { return false };
+    let above: Vec<f64> = (spectrum.frequency_hz.iter().zip(spectrum.coherence()))
+        .filter(|(f, _)| **f > 0.5 / step as f64)
+        .map(|(_, c)| c)
+        .collect();
+    above.iter().sum::<f64>() > COHERENT * above.len() as f64
+}
+
 /// Means of the series over `step` samples about every `step`-th, the first one included; at the ends over those that there are.
 pub fn thin(x: &[f64], step: usize) -> Cow<'_, [f64]> {
     if step <= 1 {
@@ -70,6 +90,34 @@ mod tests {
             }
         }
         assert!(thin(&[3.0; 100], 7).iter().all(|v| (v - 3.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_controller_that_answers_the_noise_is_seen_and_an_open_loop_is_not() {
+        let n = 4000;
+        let noise = hysid_signal::white_noise(n, 1e-4, 3).unwrap();
+        let reference = sine(0.003, n);
+        // A servo axis: the torque answers what the sensor says, or the reference alone.
+        let axis = |feedback: f64| {
+            let (mut q, mut w) = (0.0, 0.0);
+            let mut columns = (Vec::new(), Vec::new());
+            for (r, e) in reference.iter().zip(&noise) {
+                let seen = q + e;
+                let u = 0.2 * (r - feedback * seen);
+                columns.0.push(u);
+                columns.1.push(seen);
+                w += 0.02 * u - 0.05 * w;
+                q += w;
+            }
+            columns
+        };
+        for (feedback, expected) in [(1.0, true), (0.0, false)] {
+            let (u, y) = axis(feedback);
+            assert_eq!(together(&u, &y, 2), expected, "{feedback}");
+            let mut cut = y.clone();
+            cut[1000..1100].fill(f64::NAN);
+            assert_eq!(together(&u, &cut, 4), expected, "{feedback}, with a gap");
+        }
     }
 
     #[test]

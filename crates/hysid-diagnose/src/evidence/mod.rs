@@ -9,7 +9,6 @@
 //!
 //! Reference: efficient score tests (Neyman C(alpha)); circular-shift surrogates for dependent data.
 
-mod ar;
 mod below;
 mod blocks;
 mod constancy;
@@ -23,7 +22,6 @@ mod score;
 mod shape;
 mod surrogate;
 
-pub use ar::{AR_ORDERS, ArModel, fit_ar};
 pub use blocks::{better_by_chance, difference};
 pub use constancy::{Wander, lines};
 pub use layout::{Layout, Series, Whitener};

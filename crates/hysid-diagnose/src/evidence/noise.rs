@@ -12,9 +12,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 
-use hysid_signal::fourier;
+use hysid_signal::{Autoregression, fourier};
 
-use super::ar::{ArModel, fit_ar};
 use super::below::Below;
 use super::driven::Driven;
 use super::projector::norm2;
@@ -32,42 +31,6 @@ const HOLE: f64 = 0.5;
 /// Fewest samples for a shape or for process noise.
 const SHORTEST: usize = 128;
 
-impl ArModel {
-    /// With the shape that the spectrum of its innovations has, where BIC asks for one.
-    fn shaped(self, stretches: &[&[f64]], shapes: &[Vec<f64>]) -> NoiseModel {
-        let total: usize = stretches.iter().map(|s| s.len()).sum();
-        let mut bins: BTreeMap<i64, (f64, f64, f64)> = BTreeMap::new();
-        for s in stretches.iter().filter(|s| s.len() >= SHORTEST / 2) {
-            let n = s.len();
-            let mut w = vec![0.0; n];
-            self.whiten(s, &mut w);
-            // The mean is left out: a single line of any height is nothing that a spectrum's shape may follow, and an offset is an effect.
-            for (k, (re, im)) in fourier(&w).iter().enumerate().skip(1) {
-                let power = (re * re + im * im) / n as f64;
-                if !power.is_finite() {
-                    return NoiseModel::of(self, None);
-                }
-                // Neighbours between which no shape bends are one line of higher multiplicity.
-                let (x, m) = (log_frequency(k, n), multiplicity(k, n));
-                let bin = bins.entry((x * BINS / LN_2).floor() as i64).or_default();
-                *bin = (bin.0 + m * x, bin.1 + m * power, bin.2 + m);
-            }
-        }
-        let lines: Vec<(f64, f64, f64)> = bins.into_values().map(|(x, p, m)| (x / m, p / m, m)).collect();
-        let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
-        let price = 0.5 * (total as f64).ln();
-        let mut best: (Option<SpectralShape>, f64) = (None, 0.0);
-        for knots in shapes {
-            let Some((shape, gain)) = SpectralShape::fit(knots.clone(), &lines) else { continue };
-            let gain = gain - price * shape.coefficients() as f64;
-            if gain > best.1 && shape.rise(longest) > -HOLE {
-                best = (Some(shape), gain);
-            }
-        }
-        NoiseModel::of(self, best.0)
-    }
-}
-
 /// The noise of one output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
@@ -77,18 +40,18 @@ pub struct NoiseModel {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Kind {
-    Shaped(ArModel, Option<SpectralShape>),
+    Shaped(Autoregression, Option<SpectralShape>),
     Driven(Driven),
 }
 
 impl NoiseModel {
-    fn of(ar: ArModel, shape: Option<SpectralShape>) -> Self {
+    fn of(ar: Autoregression, shape: Option<SpectralShape>) -> Self {
         Self { kind: Kind::Shaped(ar, shape), below: Below::LEVEL }
     }
 
     /// White noise of this standard deviation.
     pub fn white(sigma: f64) -> Self {
-        Self::of(ArModel::white(sigma), None)
+        Self::of(Autoregression::white(sigma), None)
     }
 
     /// The noise of these stretches of one residual: an autoregression up to `max_order` (0: white) and the shape where BIC asks for it, or
@@ -98,23 +61,23 @@ impl NoiseModel {
     pub fn fit(stretches: &[&[f64]], max_order: usize, paths: &[ForcePath]) -> Self {
         let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
         if max_order == 0 || longest < SHORTEST {
-            return Self::of(fit_ar(stretches, max_order), None);
+            return Self::of(Autoregression::fit(stretches, max_order), None);
         }
         // The mean is an effect's, or what lies below the lowest line: no autoregression may follow it, which would hide any offset.
         let total: usize = stretches.iter().map(|s| s.len()).sum();
         let mean = stretches.iter().flat_map(|s| s.iter()).sum::<f64>() / total as f64;
         let centred: Vec<Vec<f64>> = stretches.iter().map(|s| s.iter().map(|e| e - mean).collect()).collect();
         let centred: Vec<&[f64]> = centred.iter().map(Vec::as_slice).collect();
-        let ar = fit_ar(&centred, max_order);
+        let ar = Autoregression::fit(&centred, max_order);
         let bent = corners(longest);
         let mut seen = vec![ar.order()];
-        let mut best = ar.shaped(&centred, &[even_knots(longest), bent.clone()].concat());
+        let mut best = Self::shaped(ar, &centred, &[even_knots(longest), bent.clone()].concat());
         let mut most = best.score(&centred);
         for order in SHORT_ORDERS {
-            let short = fit_ar(&centred, order);
+            let short = Autoregression::fit(&centred, order);
             if !seen.contains(&short.order()) {
                 seen.push(short.order());
-                let shaped = short.shaped(&centred, &bent);
+                let shaped = Self::shaped(short, &centred, &bent);
                 let score = shaped.score(&centred);
                 if score > most {
                     (best, most) = (shaped, score);
@@ -139,6 +102,40 @@ impl NoiseModel {
             }
         }
         best
+    }
+
+    /// The autoregression with the shape that the spectrum of its innovations has, where BIC asks for one.
+    fn shaped(ar: Autoregression, stretches: &[&[f64]], shapes: &[Vec<f64>]) -> Self {
+        let total: usize = stretches.iter().map(|s| s.len()).sum();
+        let mut bins: BTreeMap<i64, (f64, f64, f64)> = BTreeMap::new();
+        for s in stretches.iter().filter(|s| s.len() >= SHORTEST / 2) {
+            let n = s.len();
+            let mut w = vec![0.0; n];
+            ar.whiten(s, &mut w);
+            // The mean is left out: a single line of any height is nothing that a spectrum's shape may follow, and an offset is an effect.
+            for (k, (re, im)) in fourier(&w).iter().enumerate().skip(1) {
+                let power = (re * re + im * im) / n as f64;
+                if !power.is_finite() {
+                    return Self::of(ar, None);
+                }
+                // Neighbours between which no shape bends are one line of higher multiplicity.
+                let (x, m) = (log_frequency(k, n), multiplicity(k, n));
+                let bin = bins.entry((x * BINS / LN_2).floor() as i64).or_default();
+                *bin = (bin.0 + m * x, bin.1 + m * power, bin.2 + m);
+            }
+        }
+        let lines: Vec<(f64, f64, f64)> = bins.into_values().map(|(x, p, m)| (x / m, p / m, m)).collect();
+        let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
+        let price = 0.5 * (total as f64).ln();
+        let mut best: (Option<SpectralShape>, f64) = (None, 0.0);
+        for knots in shapes {
+            let Some((shape, gain)) = SpectralShape::fit(knots.clone(), &lines) else { continue };
+            let gain = gain - price * shape.coefficients() as f64;
+            if gain > best.1 && shape.rise(longest) > -HOLE {
+                best = (Some(shape), gain);
+            }
+        }
+        Self::of(ar, best.0)
     }
 
     /// With what lies below the lowest line of `n` samples in the mean.

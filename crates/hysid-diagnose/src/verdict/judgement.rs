@@ -58,8 +58,11 @@ impl<'d> Judgement<'d> {
         let unfinished = || setting.budget.unfinished();
         let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
         let mut blocks = block_scores(setting, pool);
-        let preferred = if significant { tie_broken(pool, &blocks) } else { 0 };
-        let (winner, trifles) = without_trifles(pool, preferred);
+        // Under a noise of its own a simulation may leave more than it has to.
+        let least = least.as_ref().unwrap_or(&pool[0]);
+        let standing = standing(pool, least).filter(|_| significant);
+        let preferred = standing.map_or(0, |s| tie_broken(pool, s, &blocks));
+        let (winner, trifles) = without_trifles(pool, preferred, least);
         if winner != preferred {
             blocks[winner] = block_score(setting, &pool[winner]);
         }
@@ -95,8 +98,6 @@ impl<'d> Judgement<'d> {
         let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
             || wandering.iter().flatten().any(|w| w.probability >= FIRM);
         let outside = elsewhere || rest.is_outside(&support, remaining.as_ref());
-        // Under a noise of its own a simulation may leave more than it has to.
-        let least = least.as_ref().unwrap_or(&pool[0]);
         let veto = if winner > 0 { veto(best, least, worse_on_blocks(&blocks, winner)) } else { None };
         if veto.is_some() {
             within = VerdictKind::Ambiguous;

@@ -4,6 +4,7 @@
 //! something small that is left.
 
 use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
+use crate::search::leaves_more;
 use crate::text::number;
 
 /// Share of a set's log evidence that a member must bring.
@@ -30,8 +31,9 @@ impl Trifle {
 }
 
 /// The set of a pool that is told in the place of the `winner`: the same without the members that add next to nothing, the least first, and what these are.
-/// A member stays where the set without it was not fitted.
-pub fn without_trifles(pool: &[Hypothesis<'_>], winner: usize) -> (usize, Vec<Trifle>) {
+/// A member stays where the set without it was not fitted, and where that set leaves a larger error than the simulation as it is (`simulation`, where it
+/// leaves the least) and this one does not: under a noise that wanders a constant force brings little evidence, and most of the error may be its.
+pub fn without_trifles(pool: &[Hypothesis<'_>], winner: usize, simulation: &Hypothesis<'_>) -> (usize, Vec<Trifle>) {
     let gain = |i: usize| pool[i].log_evidence - pool[0].log_evidence;
     let (mut told, mut trifles) = (winner, Vec::new());
     loop {
@@ -42,7 +44,8 @@ pub fn without_trifles(pool: &[Hypothesis<'_>], winner: usize) -> (usize, Vec<Tr
         }
         let share = |member: usize| {
             let rest = best_that_says(pool, &best.key_without(member))?;
-            Some((member, rest, 1.0 - gain(rest) / whole))
+            let explains = leaves_more(best, simulation) || !leaves_more(&pool[rest], simulation);
+            explains.then_some((member, rest, 1.0 - gain(rest) / whole))
         };
         let least = (0..best.effects.len()).filter_map(share).min_by(|a, b| a.2.total_cmp(&b.2));
         let Some((member, rest, share)) = least.filter(|l| l.2 < TRIFLE) else { break };
@@ -87,7 +90,7 @@ mod tests {
         let spring = fitted(&none, "cubic_stiffness");
         let (both, offset) = (fitted(&spring, "output_offset"), fitted(&none, "output_offset"));
         let pool = [none, spring, offset, both];
-        let (place, trifles) = without_trifles(&pool, 3);
+        let (place, trifles) = without_trifles(&pool, 3, &pool[0]);
         (pool[place].effects.iter().map(|e| e.mechanism.id).collect(), trifles.len())
     }
 

@@ -10,6 +10,7 @@ use crate::evidence::{difference, norm2};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting, block_score};
 use crate::search::compose::best_of;
+use crate::search::leaves_more;
 
 /// Weight of the log evidence in the probabilities.
 pub const EVIDENCE_WEIGHT: f64 = 0.4;
@@ -97,9 +98,20 @@ pub fn block_scores(setting: &Setting<'_>, pool: &[Hypothesis<'_>]) -> Vec<Optio
         .collect()
 }
 
+/// The standing set; where it leaves a larger error than the simulation as it is, calling noise what its effects do not explain, the best of those
+/// with more evidence that explain: the price of a further effect is asked where there is something to lose by it.
+pub fn standing(pool: &[Hypothesis<'_>], least: &Hypothesis<'_>) -> Option<usize> {
+    let standing = best_of(pool)?;
+    if pool[standing].effects.is_empty() || !leaves_more(&pool[standing], least) {
+        return Some(standing);
+    }
+    let better = (0..pool.len()).filter(|&i| pool[i].log_evidence > pool[standing].log_evidence);
+    let explaining = better.filter(|&i| !leaves_more(&pool[i], least));
+    explaining.max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence)).or(Some(standing))
+}
+
 /// The standing set, or one of its size that ties in evidence and predicts the held-out blocks better.
-pub fn tie_broken(pool: &[Hypothesis<'_>], blocks: &[Option<(f64, Vec<f64>)>]) -> usize {
-    let Some(standing) = best_of(pool) else { return 0 };
+pub fn tie_broken(pool: &[Hypothesis<'_>], standing: usize, blocks: &[Option<(f64, Vec<f64>)>]) -> usize {
     let score = |i: usize| blocks[i].as_ref().map_or(f64::NEG_INFINITY, |b| b.0);
     (0..pool.len())
         .filter(|&i| {

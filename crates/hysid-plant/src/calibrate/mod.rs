@@ -13,7 +13,6 @@ mod data;
 mod frequency;
 mod initial;
 mod least_squares;
-mod noise;
 mod objective;
 mod observer;
 mod refined;
@@ -23,6 +22,7 @@ mod starts;
 #[cfg(test)]
 mod tests;
 
+use hysid_signal::Autoregression;
 use nalgebra::DMatrix;
 
 use crate::engine::{Compiled, Start};
@@ -32,7 +32,6 @@ use observer::rms_about_mean;
 
 pub use data::Data;
 pub use initial::INITIAL_SHARE;
-pub use noise::NoiseModel;
 pub use settings::{Calibration, CalibrationError, Effort, Flag, Settings};
 
 impl Compiled {
@@ -51,7 +50,7 @@ impl Compiled {
         let scale: Vec<f64> = (0..outputs)
             .map(|j| data.iter().map(|d| rms_about_mean(&d.measured[j])).fold(0.0, f64::max).max(f64::MIN_POSITIVE))
             .collect();
-        let white: Vec<NoiseModel> = scale.iter().map(|s| NoiseModel::white(*s)).collect();
+        let white: Vec<Autoregression> = scale.iter().map(|s| Autoregression::white(*s)).collect();
         let user = settings.theta.clone().unwrap_or_else(|| self.theta());
         let longest = data.iter().max_by_key(|d| d.len()).ok_or(CalibrationError::NoData)?;
         let check = |theta: &[f64]| {
@@ -226,12 +225,12 @@ impl Compiled {
         }
     }
 
-    fn noise_models(&self, data: &[Data], responses: &[crate::engine::Response], order: usize) -> Vec<NoiseModel> {
+    fn noise_models(&self, data: &[Data], responses: &[crate::engine::Response], order: usize) -> Vec<Autoregression> {
         let residuals = residuals(data, responses);
         (0..self.simulation().outputs.len())
             .map(|j| {
-                let series: Vec<&[f64]> = residuals.iter().map(|r| r[j].as_slice()).collect();
-                NoiseModel::fit(&series, order)
+                let stretches = residuals.iter().flat_map(|r| r[j].split(|e| !e.is_finite()));
+                Autoregression::fit(&stretches.filter(|s| !s.is_empty()).collect::<Vec<_>>(), order)
             })
             .collect()
     }

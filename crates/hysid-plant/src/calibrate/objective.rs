@@ -1,8 +1,9 @@
 //! The sum of squares that is minimised: whitened output errors over all stretches, with their derivatives.
 
+use hysid_signal::Autoregression;
+
 use super::Data;
 use super::least_squares::Normal;
-use super::noise::NoiseModel;
 use crate::engine::{Compiled, Direction, MOST_STEPS, Observer, Run, Start};
 
 /// How far around a point the border of stability is looked for, parameter by parameter.
@@ -18,7 +19,7 @@ pub(crate) struct Objective<'a> {
     pub theta: Vec<f64>,
     pub substeps: usize,
     /// One noise model for each output.
-    pub noise: Vec<NoiseModel>,
+    pub noise: Vec<Autoregression>,
     /// Observer gain for each stretch, if the run is corrected.
     pub gains: Option<Vec<Vec<f64>>>,
     /// Simulations run so far, a chunk of derivatives counting as one.
@@ -77,9 +78,9 @@ impl Objective<'_> {
                 let (measured, simulated) = (&data.measured[j], &result.response.outputs[j]);
                 let present: Vec<bool> = measured.iter().map(|y| y.is_finite()).collect();
                 let mut e: Vec<f64> = simulated.iter().zip(measured).map(|(s, m)| s - m).collect();
-                noise.whiten(&mut e, &present);
+                noise.whiten_present(&mut e, &present);
                 let mut columns: Vec<Vec<f64>> = result.tangents.iter().map(|t| t[j].clone()).collect();
-                columns.iter_mut().for_each(|c| noise.whiten(c, &present));
+                columns.iter_mut().for_each(|c| noise.whiten_present(c, &present));
                 let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
                 total.add(&e, &columns, &index);
             }

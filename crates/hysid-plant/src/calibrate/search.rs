@@ -2,9 +2,10 @@
 
 use std::cell::LazyCell;
 
+use hysid_signal::Autoregression;
+
 use super::Data;
 use super::least_squares::{Limits, minimise};
-use super::noise::NoiseModel;
 use super::objective::Objective;
 use super::observer::rms_about_mean;
 use super::refined::Attained;
@@ -36,11 +37,11 @@ impl Start {
 
     /// Whether a cost is that of the linear model: the core is linear then, and no other parameters can do better. `None` of
     /// several stretches, of which only one was identified.
-    fn is_explained(&self, cost: f64, data: &[Data], noise: &[NoiseModel]) -> bool {
+    fn is_explained(&self, cost: f64, data: &[Data], noise: &[Autoregression]) -> bool {
         let (Some(linear), [data]) = (&self.linear, data) else { return false };
         let samples = data.len() as f64;
         let sum = |f: &dyn Fn(&Attained) -> f64| -> f64 {
-            linear.iter().zip(noise).map(|(a, n)| 0.5 * samples * f(a) / (n.sigma * n.sigma)).sum()
+            linear.iter().zip(noise).map(|(a, n)| 0.5 * samples * f(a) / n.innovation().powi(2)).sum()
         };
         let by_chance = |a: &Attained| a.mean_square * (1.0 + 2.0 * a.unknowns as f64 / samples);
         cost >= 0.95 * sum(&|a| a.mean_square) && cost <= sum(&by_chance)
@@ -53,7 +54,7 @@ impl Compiled {
         &self,
         data: &[Data],
         estimated: &[usize],
-        white: &[NoiseModel],
+        white: &[Autoregression],
         user: &[f64],
         substeps: usize,
         settings: &Settings,
@@ -91,7 +92,7 @@ impl Compiled {
         all: impl Iterator<Item = Start>,
         short: &[Data],
         estimated: &[usize],
-        white: &[NoiseModel],
+        white: &[Autoregression],
         substeps: usize,
     ) -> (Option<Vec<f64>>, usize) {
         let (lower, upper) = self.box_of(short, estimated);

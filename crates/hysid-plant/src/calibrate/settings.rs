@@ -1,6 +1,6 @@
 //! What a calibration is asked, and what it answers.
 
-use super::noise::NoiseModel;
+use hysid_signal::Autoregression;
 
 /// How far a calibration searches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,7 +103,7 @@ pub struct Calibration {
     /// Measured minus simulated, `[stretch][output][sample]`; `NaN` where nothing was measured.
     pub residuals: Vec<Vec<Vec<f64>>>,
     /// Noise model of each output's residual.
-    pub noise: Vec<NoiseModel>,
+    pub noise: Vec<Autoregression>,
     /// Free-run rms error of each output, over all stretches.
     pub rmse: Vec<f64>,
     /// What is suspicious.

@@ -1,8 +1,7 @@
 //! What the start from refined instrumental variables does for whole simulations.
 
-use hysid_signal::{Excitation, white_noise};
+use hysid_signal::{Autoregression, Excitation, white_noise};
 
-use super::noise::NoiseModel;
 use super::observer::rms_about_mean;
 use super::search::{HOMOTOPY, Start};
 use super::starts::{Core, design};
@@ -85,7 +84,7 @@ fn a_short_record_calibrates_from_far_away_with_this_start_and_not_without() {
         let core = Core::new(&compiled, &data, &estimated, &user, &designed, 1).expect("linear");
         let others = core.by_measured_response(2).into_iter().chain(designed.iter().step_by(11).cloned());
         let all = std::iter::once(user.clone()).chain(others).map(|theta| Start::new(theta, HOMOTOPY));
-        let white = [NoiseModel::white(measured)];
+        let white = [Autoregression::white(measured)];
         let (best, _) = compiled.search_from(all, std::slice::from_ref(&data), &estimated, &white, 1);
         let local = Settings { gls_rounds: 0, ..Settings::local(best.expect("finite")) };
         let without = compiled.calibrate(std::slice::from_ref(&data), &local).expect("calibrates");

@@ -9,25 +9,49 @@ use super::super::verdict::Verdict;
 use super::CELLS;
 use super::row::{Row, family_fits, over_oracle};
 
-pub(super) fn cell(singles: &[&Row], dnr: f64) -> (f64, usize, [usize; 4], f64, f64) {
-    let list: Vec<&&Row> = singles
-        .iter()
-        .filter(|r| {
-            let at =
-                CELLS.iter().copied().min_by(|a, b| distance(*a, r.label.dnr).total_cmp(&distance(*b, r.label.dnr)));
-            at == Some(dnr)
-        })
-        .collect();
-    let count = |test: &dyn Fn(&Row) -> bool| list.iter().filter(|r| test(r)).count();
-    let hits = [
-        count(&|r| r.verdict().is_some_and(Verdict::alarmed)),
-        count(&Row::families_right),
-        count(&Row::mechanisms_right),
-        count(&Row::slots_right),
-    ];
-    let fall: Vec<f64> = list.iter().map(|r| r.after() / r.rivals.before).collect();
-    let over: Vec<f64> = list.iter().map(|r| over_oracle(r)).collect();
-    (dnr, list.len(), hits, quantile(&fall, 0.5), quantile(&over, 0.5))
+/// What came of some cases.
+#[derive(Debug, Clone)]
+pub struct Cell {
+    /// By which they were gathered.
+    pub at: f64,
+    /// How many they are.
+    pub n: usize,
+    /// How many were detected, and have the right family, mechanism, slot.
+    pub hits: [usize; 4],
+    /// Median held-out error after over that before.
+    pub fall: f64,
+    /// Median held-out error after over the oracle's.
+    pub over_oracle: f64,
+}
+
+impl Cell {
+    fn new(at: f64, list: &[&Row]) -> Self {
+        let count = |test: &dyn Fn(&Row) -> bool| list.iter().filter(|r| test(r)).count();
+        let hits = [
+            count(&|r| r.verdict().is_some_and(Verdict::alarmed)),
+            count(&Row::families_right),
+            count(&Row::mechanisms_right),
+            count(&Row::slots_right),
+        ];
+        let median = |of: &dyn Fn(&Row) -> f64| quantile(&list.iter().map(|r| of(r)).collect::<Vec<_>>(), 0.5);
+        let (fall, over_oracle) = (median(&|r| r.after() / r.rivals.before), median(&|r| over_oracle(r)));
+        Self { at, n: list.len(), hits, fall, over_oracle }
+    }
+}
+
+/// The cases of which this is the nearest difficulty.
+pub(super) fn nearest(singles: &[&Row], dnr: f64) -> Cell {
+    let near = |r: &Row| {
+        let by_distance = |a: &f64, b: &f64| distance(*a, r.label.dnr).total_cmp(&distance(*b, r.label.dnr));
+        CELLS.iter().copied().min_by(by_distance) == Some(dnr)
+    };
+    Cell::new(dnr, &singles.iter().copied().filter(|r| near(r)).collect::<Vec<_>>())
+}
+
+/// The cases of which this many nats can be seen and fewer than the next class begins with.
+pub(super) fn within(singles: &[&Row], from: f64, to: f64) -> Cell {
+    let list = singles.iter().copied().filter(|r| (from..to).contains(&r.rivals.visible));
+    Cell::new(from, &list.collect::<Vec<_>>())
 }
 
 fn distance(a: f64, b: f64) -> f64 {

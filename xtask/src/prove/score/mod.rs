@@ -17,7 +17,8 @@ use std::collections::BTreeMap;
 use hysid_concealed::case::Group;
 use hysid_concealed::noise::Noise;
 
-use self::breakdown::{cell, competitors, confusion};
+pub use self::breakdown::Cell;
+use self::breakdown::{competitors, confusion, nearest, within};
 use self::line::Target::{self, AtLeast, AtMost, Within};
 use self::numbers::jump;
 pub use self::numbers::shared;
@@ -36,8 +37,10 @@ pub struct Score {
     pub confusion: BTreeMap<(String, String), usize>,
     /// Statements with probability 0.9 or more that are wrong.
     pub firm_wrong: Vec<String>,
-    /// Per difficulty: cases, detected, family right, mechanism right, slot right, median after/before, median after/oracle.
-    pub cells: Vec<(f64, usize, [usize; 4], f64, f64)>,
+    /// Single effects by difficulty.
+    pub cells: Vec<Cell>,
+    /// Single effects by what could be seen of them at most: from so many nats on to the next.
+    pub seen: Vec<Cell>,
     /// Reliability diagram of the mechanisms' probabilities.
     pub bins: Vec<Bin>,
     /// Median held-out error of each competitor over that of the recalibrated baseline, by difficulty.
@@ -50,6 +53,8 @@ pub struct Score {
 
 /// The difficulties of the table.
 pub const CELLS: [f64; 5] = [0.1, 0.2, 0.5, 1.0, 3.0];
+/// Where the classes of what could be seen begin, in nats.
+const SEEN: [f64; 5] = [0.0, 10.0, 20.0, 40.0, 100.0];
 
 /// How many of some things pass a test, and how many there are.
 fn hits<T>(list: &[T], test: impl Fn(&T) -> bool) -> (usize, usize) {
@@ -241,7 +246,12 @@ pub fn score(rows: &[Row]) -> Score {
         lines,
         confusion: confusion(rows),
         firm_wrong,
-        cells: CELLS.iter().map(|&dnr| cell(&all.singles, dnr)).collect(),
+        cells: CELLS.iter().map(|&dnr| nearest(&all.singles, dnr)).collect(),
+        seen: SEEN
+            .iter()
+            .zip(SEEN[1..].iter().chain([&f64::INFINITY]))
+            .map(|(from, to)| within(&all.singles, *from, *to))
+            .collect(),
         bins,
         competitors: competitors(&all.known),
         broken: rows.iter().filter_map(broken).collect(),

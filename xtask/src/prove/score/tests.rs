@@ -23,6 +23,7 @@ fn row(group: Group, diagnosis: &dyn Fn(&Label) -> String, after: Option<f64>) -
         sindy: None,
         narx: (0.6, None),
         narx_on_residual: (0.6, None),
+        visible: 200.0,
         separation: Some(100.0),
     };
     Row::new(&case, trial, rivals)

@@ -1,27 +1,81 @@
 //! The autoregressive model of a noise: order by BIC, coefficients by Burg's recursion over several stretches.
 //!
-//! `e[n] = a_1 e[n-1] + ... + a_p e[n-p] + sigma w[n]`, `w` white with unit variance. All lower orders are kept, so that the first
+//! `e[n] = a_1 e[n-1] + ... + a_p e[n-p] + sigma w[n]`, `w` white with unit variance; `e` and `sigma` have the unit of the signal. All lower orders are kept, so that the first
 //! `p` samples of a stretch are whitened by their own shorter predictors: the transformation is the Cholesky factor of the stationary
 //! covariance, not an approximation that drops samples.
 //!
 //! Reference: J. P. Burg, Maximum entropy spectral analysis (1975); P. J. Brockwell and R. A. Davis, Time Series, section 5.2.
 
 /// The orders that are compared.
-pub const AR_ORDERS: [usize; 8] = [0, 1, 2, 3, 4, 8, 12, 16];
+const ORDERS: [usize; 8] = [0, 1, 2, 3, 4, 8, 12, 16];
 
 /// An autoregressive model with every lower order of the recursion that led to it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ArModel {
+pub struct Autoregression {
     /// `predictors[k]` holds the `k` coefficients of the predictor of order `k`; the last one is the model.
     predictors: Vec<Vec<f64>>,
     /// Standard deviation of each order's prediction error, in the unit of the series.
     sigma: Vec<f64>,
 }
 
-impl ArModel {
+impl Autoregression {
     /// White noise of this standard deviation.
     pub fn white(sigma: f64) -> Self {
         Self { predictors: vec![Vec::new()], sigma: vec![sigma.max(f64::MIN_POSITIVE)] }
+    }
+
+    /// The model of these stretches of one noise, its order the one of the smallest BIC up to `max_order`.
+    ///
+    /// The mean is not removed: a bias is the business of the caller. Series too short for an order are left out of that order.
+    pub fn fit(stretches: &[&[f64]], max_order: usize) -> Self {
+        let total: usize = stretches.iter().map(|s| s.len()).sum();
+        let power: f64 = stretches.iter().flat_map(|s| s.iter()).map(|x| x * x).sum();
+        if total == 0 || power <= 0.0 || !power.is_finite() {
+            return Self::white(if power.is_finite() { f64::MIN_POSITIVE.sqrt() } else { 1.0 });
+        }
+        let max_order = max_order.min(total / 20);
+        let mut forward: Vec<Vec<f64>> = stretches.iter().map(|s| s.to_vec()).collect();
+        let mut backward = forward.clone();
+        let mut predictors = vec![Vec::new()];
+        let mut variance = vec![power / total as f64];
+        for k in 1..=max_order {
+            let (mut cross, mut energy) = (0.0, 0.0);
+            for (f, b) in forward.iter().zip(&backward) {
+                for n in k..f.len() {
+                    cross += f[n] * b[n - 1];
+                    energy += f[n] * f[n] + b[n - 1] * b[n - 1];
+                }
+            }
+            if energy <= 0.0 {
+                break;
+            }
+            let reflection = (2.0 * cross / energy).clamp(-0.999_999, 0.999_999);
+            for (f, b) in forward.iter_mut().zip(backward.iter_mut()) {
+                for n in (k..f.len()).rev() {
+                    let (fo, bo) = (f[n], b[n - 1]);
+                    f[n] = fo - reflection * bo;
+                    b[n] = bo - reflection * fo;
+                }
+            }
+            let last = &predictors[k - 1];
+            let mut next: Vec<f64> = (0..k - 1).map(|i| last[i] - reflection * last[k - 2 - i]).collect();
+            next.push(reflection);
+            variance.push(variance[k - 1] * (1.0 - reflection * reflection));
+            predictors.push(next);
+        }
+        let best = ORDERS
+            .iter()
+            .copied()
+            .filter(|&p| p < variance.len())
+            .min_by(|&a, &b| {
+                let bic = |p: usize| total as f64 * variance[p].max(1e-300).ln() + p as f64 * (total as f64).ln();
+                bic(a).total_cmp(&bic(b))
+            })
+            .unwrap_or(0);
+        predictors.truncate(best + 1);
+        variance.truncate(best + 1);
+        let sigma = variance.iter().map(|v| v.sqrt().max(f64::MIN_POSITIVE)).collect();
+        Self { predictors, sigma }
     }
 
     /// The order `p`.
@@ -40,7 +94,7 @@ impl ArModel {
     }
 
     /// Natural logarithm of the power at a frequency in cycles a sample, over that of the innovations.
-    pub(super) fn log_power(&self, frequency: f64) -> f64 {
+    pub fn log_power(&self, frequency: f64) -> f64 {
         let (mut re, mut im) = (1.0, 0.0);
         for (i, a) in self.coefficients().iter().enumerate() {
             let (sin, cos) = (std::f64::consts::TAU * frequency * (i + 1) as f64).sin_cos();
@@ -73,7 +127,22 @@ impl ArModel {
         }
     }
 
-    /// Colours unit white noise in place: the inverse of [`ArModel::whiten`].
+    /// Whitens a series with missing samples in place. Only where `present` is true a sample counts; the others become 0, and
+    /// after one the filter starts anew.
+    pub fn whiten_present(&self, series: &mut [f64], present: &[bool]) {
+        let source = series.to_vec();
+        series.fill(0.0);
+        let mut first = 0;
+        for run in present[..source.len()].chunk_by(|a, b| a == b) {
+            let rows = first..first + run.len();
+            first = rows.end;
+            if run[0] {
+                self.whiten(&source[rows.clone()], &mut series[rows]);
+            }
+        }
+    }
+
+    /// Colours unit white noise in place: the inverse of [`Autoregression::whiten`].
     pub fn colour(&self, w: &mut [f64]) {
         let p = self.order();
         for n in 0..w.len() {
@@ -85,68 +154,12 @@ impl ArModel {
     }
 }
 
-/// The autoregressive model of these stretches of one noise, its order the smallest BIC among [`AR_ORDERS`] up to `max_order`.
-///
-/// The mean is not removed: a bias is the business of the caller. Series too short for an order are left out of that order.
-pub fn fit_ar(stretches: &[&[f64]], max_order: usize) -> ArModel {
-    let total: usize = stretches.iter().map(|s| s.len()).sum();
-    let power: f64 = stretches.iter().flat_map(|s| s.iter()).map(|x| x * x).sum();
-    if total == 0 || power <= 0.0 || !power.is_finite() {
-        return ArModel::white(if power.is_finite() { f64::MIN_POSITIVE.sqrt() } else { 1.0 });
-    }
-    let max_order = max_order.min(total / 20);
-    let mut forward: Vec<Vec<f64>> = stretches.iter().map(|s| s.to_vec()).collect();
-    let mut backward = forward.clone();
-    let mut predictors = vec![Vec::new()];
-    let mut variance = vec![power / total as f64];
-    for k in 1..=max_order {
-        let (mut cross, mut energy) = (0.0, 0.0);
-        for (f, b) in forward.iter().zip(&backward) {
-            for n in k..f.len() {
-                cross += f[n] * b[n - 1];
-                energy += f[n] * f[n] + b[n - 1] * b[n - 1];
-            }
-        }
-        if energy <= 0.0 {
-            break;
-        }
-        let reflection = (2.0 * cross / energy).clamp(-0.999_999, 0.999_999);
-        for (f, b) in forward.iter_mut().zip(backward.iter_mut()) {
-            for n in (k..f.len()).rev() {
-                let (fo, bo) = (f[n], b[n - 1]);
-                f[n] = fo - reflection * bo;
-                b[n] = bo - reflection * fo;
-            }
-        }
-        let last = &predictors[k - 1];
-        let mut next: Vec<f64> = (0..k - 1).map(|i| last[i] - reflection * last[k - 2 - i]).collect();
-        next.push(reflection);
-        variance.push(variance[k - 1] * (1.0 - reflection * reflection));
-        predictors.push(next);
-    }
-    let best = AR_ORDERS
-        .iter()
-        .copied()
-        .filter(|&p| p < variance.len())
-        .min_by(|&a, &b| {
-            let bic = |p: usize| total as f64 * variance[p].max(1e-300).ln() + p as f64 * (total as f64).ln();
-            bic(a).total_cmp(&bic(b))
-        })
-        .unwrap_or(0);
-    predictors.truncate(best + 1);
-    variance.truncate(best + 1);
-    let sigma = variance.iter().map(|v| v.sqrt().max(f64::MIN_POSITIVE)).collect();
-    ArModel { predictors, sigma }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_distr::{Distribution, StandardNormal};
 
     fn white(n: usize, seed: u64) -> Vec<f64> {
-        let mut rng = crate::random::generator(seed, 0);
-        (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
+        crate::white_noise(n, 1.0, seed).unwrap()
     }
 
     #[test]
@@ -155,7 +168,7 @@ mod tests {
         for n in 2..e.len() {
             e[n] += 1.5 * e[n - 1] - 0.8 * e[n - 2];
         }
-        let m = fit_ar(&[&e[..9000], &e[9000..]], 16);
+        let m = Autoregression::fit(&[&e[..9000], &e[9000..]], 16);
         assert_eq!(m.order(), 2, "{:?}", m.coefficients());
         assert!((m.coefficients()[0] - 1.5).abs() < 0.02 && (m.coefficients()[1] + 0.8).abs() < 0.02);
         assert!((m.innovation() - 1.0).abs() < 0.02);
@@ -163,7 +176,7 @@ mod tests {
 
     #[test]
     fn white_noise_stays_white() {
-        assert_eq!(fit_ar(&[&white(3000, 7)], 16).order(), 0);
+        assert_eq!(Autoregression::fit(&[&white(3000, 7)], 16).order(), 0);
     }
 
     #[test]
@@ -172,7 +185,7 @@ mod tests {
         for n in 1..e.len() {
             e[n] += 0.9 * e[n - 1];
         }
-        let m = fit_ar(&[&e], 16);
+        let m = Autoregression::fit(&[&e], 16);
         let mut w = vec![0.0; e.len()];
         m.whiten(&e, &mut w);
         m.colour(&mut w);
@@ -189,7 +202,7 @@ mod tests {
             for n in 1..e.len() {
                 e[n] += 0.9 * e[n - 1];
             }
-            fit_ar(&[&e], 4)
+            Autoregression::fit(&[&e], 4)
         };
         let (mut sum, mut count) = (0.0, 0);
         for seed in 0..400 {
@@ -206,8 +219,23 @@ mod tests {
     }
 
     #[test]
+    fn a_missing_sample_parts_two_stretches() {
+        let mut e = white(300, 2);
+        (1..e.len()).for_each(|n| e[n] += 0.9 * e[n - 1]);
+        let m = Autoregression::fit(&[&e], 4);
+        let mut parted = e.clone();
+        parted[100] = f64::NAN;
+        let present: Vec<bool> = parted.iter().map(|x| x.is_finite()).collect();
+        m.whiten_present(&mut parted, &present);
+        let mut alone = vec![0.0; 199];
+        m.whiten(&e[101..], &mut alone);
+        assert_eq!(parted[100], 0.0);
+        assert_eq!(parted[101..], alone[..]);
+    }
+
+    #[test]
     fn silence_is_no_failure() {
-        assert_eq!(fit_ar(&[&[0.0; 100]], 16).order(), 0);
-        assert_eq!(fit_ar(&[], 16).order(), 0);
+        assert_eq!(Autoregression::fit(&[&[0.0; 100]], 16).order(), 0);
+        assert_eq!(Autoregression::fit(&[], 16).order(), 0);
     }
 }
