@@ -191,6 +191,9 @@ fn statement(
             file.experiment = separating(setting, &contest, &mut file.alternatives, seed, hooks.expired);
         }
     }
+    if !*significant {
+        file.notes.extend(taken_for_forces(simulation, &best.base.whitener.models));
+    }
     file.notes.extend(judged.trifles.iter().map(Trifle::words));
     if let Some(why) = judged.veto {
         file.notes.push(format!("{why}, and no augmented simulation is written"));
@@ -199,6 +202,22 @@ fn statement(
         file.notes.push("simulation and recording differ by more than noise does, but no effect and no generic term outweighs what its parameters cost: what is told is the likeliest, and no augmented simulation is written".into());
     }
     file
+}
+
+/// What of a residual is taken for the work of unknown forces, in words: a law that is missing and wanders like one would pass for it.
+fn taken_for_forces(simulation: &Simulation, noise: &[NoiseModel]) -> Vec<String> {
+    let outputs = simulation.outputs.iter().zip(noise);
+    outputs
+        .filter_map(|(output, model)| {
+            let (sensor, all) = (model.beside_a_force()?, model.noise_rms());
+            Some(format!(
+                "what is left of `{}` wanders as if an unknown force acted on the machine, beside a noise of {} of the sensor ({} in all), and is taken for that; if nothing acts there, something is missing that this recording does not tell from it",
+                output.column,
+                number(sensor),
+                number(all)
+            ))
+        })
+        .collect()
 }
 
 /// What is written as the augmented simulation.

@@ -154,6 +154,11 @@ impl Driven {
         self.sigma * self.filter.sigma(usize::MAX)
     }
 
+    /// Standard deviation of the sensor's noise, beside what the force makes.
+    pub fn sensor_rms(&self) -> f64 {
+        self.sigma
+    }
+
     /// Standard deviation of what it was fitted to.
     pub fn noise_rms(&self) -> f64 {
         self.rms

@@ -190,6 +190,14 @@ impl NoiseModel {
         matches!(self.kind, Kind::Driven(_))
     }
 
+    /// Standard deviation of the sensor's noise beside that of a force through the plant; `None` where there is no such force.
+    pub fn beside_a_force(&self) -> Option<f64> {
+        match &self.kind {
+            Kind::Driven(driven) => Some(driven.sensor_rms()),
+            Kind::Shaped(..) => None,
+        }
+    }
+
     /// Whether it goes on below the lowest line as an equation says that holds at every frequency: a force through the plant, or an autoregression alone.
     pub fn is_known_below(&self) -> bool {
         matches!(self.kind, Kind::Driven(_) | Kind::Shaped(_, None))

@@ -11,7 +11,7 @@ use super::peaks::lines_of;
 use super::rehearsal::by_rehearsal;
 use super::screen::Candidate;
 use crate::evidence::NoiseModel;
-use crate::evidence::better_by_chance;
+use crate::evidence::{better_by_chance, difference};
 use crate::mechanism::{Places, SLOW};
 use crate::model::base::spared;
 use crate::model::hypothesis::{Effect, Hypothesis, block_score};
@@ -51,7 +51,9 @@ impl<'d> Search<'_, 'd> {
     /// fitted to no worse than the simulation as it is.
     ///
     /// A ratio of evidences exceeds `x` by chance with a probability of at most `1/x` (Markov);
-    /// there are as many sets as can be made of the candidates.
+    /// there are as many sets as can be made of the candidates. That the noise model is an estimate is allowed for by [`ODDS_AGAINST`], but not
+    /// where a set turns a coloured residual into a white one: there the simulation as it is has the best colour that could be found for it, and the set
+    /// has none to choose.
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
         let sets = |h: &Hypothesis<'_>| {
             (0..h.effects.len())
@@ -70,10 +72,13 @@ impl<'d> Search<'_, 'd> {
             h.log_evidence + spared_by(h) - if slow { SLOW } else { 0.0 }
         };
         let none = start.log_evidence + spared_by(start);
-        let bound = |h: &Hypothesis<'_>| ODDS_AGAINST * sets(h) * (none - evidence(h)).exp();
+        let whitens =
+            |h: &Hypothesis<'_>| start.base.whitener.coefficients() > 0 && h.base.whitener.coefficients() == 0;
+        let odds = |h: &Hypothesis<'_>| if whitens(h) { 1.0 } else { ODDS_AGAINST };
+        let bound = |h: &Hypothesis<'_>| odds(h) * sets(h) * (none - evidence(h)).exp();
         let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
         let p = bound(best).min(1.0);
-        (p < self.level() && self.predicts_blocks(start, best)).then_some(p)
+        (p < self.level() && self.holds_on_blocks(start, best)).then_some(p)
     }
 
     /// The level of each test of the second look.
@@ -86,10 +91,22 @@ impl<'d> Search<'_, 'd> {
         self.open(start).map(|o| o.by_chance(ODDS_AGAINST)).filter(|p| *p < self.level())
     }
 
-    /// Whether a set predicts blocks that it was not fitted to better than the simulation as it is.
+    /// Squared errors on blocks that they were not fitted to, of the simulation as it is and of a set.
+    fn squares_on_blocks(&self, start: &Hypothesis<'d>, set: &Hypothesis<'d>) -> Option<[Vec<f64>; 2]> {
+        let squares = |h| block_score(&self.setting, h).map(|(_, squares)| squares);
+        Some([squares(start)?, squares(set)?])
+    }
+
+    /// Whether a set predicts such blocks better than the simulation as it is.
     fn predicts_blocks(&self, start: &Hypothesis<'d>, set: &Hypothesis<'d>) -> bool {
-        let squares = |h| block_score(&self.setting, h).map(|(_, squares)| squares.iter().sum::<f64>());
-        matches!((squares(start), squares(set)), (Some(before), Some(after)) if after < before)
+        self.squares_on_blocks(start, set).is_some_and(|[before, after]| is_less(&after, &before))
+    }
+
+    /// Whether a set predicts such blocks no worse, within a standard error: what acts at a few moments only may leave all of them as they are.
+    fn holds_on_blocks(&self, start: &Hypothesis<'d>, set: &Hypothesis<'d>) -> bool {
+        self.squares_on_blocks(start, set).is_some_and(|[before, after]| {
+            is_less(&after, &before) || difference(&after, &before).is_some_and(|(more, error)| more <= error)
+        })
     }
 
     /// The probability, below the level, that the likeliest effects gain so much where nothing is missing, by simulation.
@@ -133,11 +150,15 @@ impl<'d> Search<'_, 'd> {
         if !large && best.log_evidence - start.log_evidence < SURE {
             return None;
         }
-        let (_, before) = block_score(&self.setting, start)?;
-        let (_, after) = block_score(&self.setting, best)?;
+        let [before, after] = self.squares_on_blocks(start, best)?;
         // Too few blocks tell nothing of chance; what they tell of the error remains.
         let p = better_by_chance(&before, &after).map_or(1.0, |p| (p * fitted.len() as f64).min(1.0));
         let halved = after.iter().sum::<f64>() < HALF * before.iter().sum::<f64>();
         (p < self.options.alpha || halved).then_some(p)
     }
+}
+
+/// Whether some squared errors are less than others, in all.
+fn is_less(a: &[f64], b: &[f64]) -> bool {
+    a.iter().sum::<f64>() < b.iter().sum::<f64>()
 }
