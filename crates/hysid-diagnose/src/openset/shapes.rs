@@ -216,8 +216,9 @@ type Factor<'f> = (String, bool, Box<dyn Fn(f64) -> f64 + 'f>);
 
 /// Products of a function of the displacement `x` and one of the velocity `v`, and what is periodic in the displacement. A resistance
 /// that is proportional to the speed, one that has its sign only and one that has its size only may each depend on the place: in proportion to it or
-/// to its size, on one side of a knee, or in waves.
-pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>])) -> Vec<Shape> {
+/// to its size, on one side of a knee, or in waves: some over its range, and where it is an angle (`radians` for each of its unit) those that
+/// return with every turn and with every half.
+pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>]), radians: Option<f64>) -> Vec<Shape> {
     let speeds: [Factor<'_>; 3] = [
         (b.to_owned(), true, Box::new(|v| v)),
         (format!("sign({b})"), true, Box::new(f64::signum)),
@@ -236,8 +237,8 @@ pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>])) -> Vec<
     let kind = |odd: bool| if odd { Kind::Odd } else { Kind::Even };
     let mut out = vec![Shape::new(format!("{a}*{b}^2"), Kind::Odd, both(x, v, |x, v| x * v * v))];
     let span = spread(x);
-    for cycles in CYCLES.into_iter().filter(|_| span > 0.0) {
-        let k = TAU * cycles / span;
+    let turns = radians.into_iter().flat_map(|r| [r, 2.0 * r]).filter(|k| k * span > TAU * CYCLES[0]);
+    for k in CYCLES.into_iter().filter(|_| span > 0.0).map(|cycles| TAU * cycles / span).chain(turns) {
         let n = free(k);
         for (text, odd, f) in
             [(format!("sin({n}*{a})"), true, f64::sin as fn(f64) -> f64), (format!("cos({n}*{a})"), false, f64::cos)]
@@ -273,4 +274,25 @@ fn spread(x: &[Vec<f64>]) -> f64 {
 pub fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
     let (low, high) = range(x);
     Expr::call2(Function::Min, Expr::call2(Function::Max, coordinate, low), high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_depends_on_an_angle_returns_with_every_turn() {
+        let of = |reach: f64, radians: Option<f64>| -> Vec<String> {
+            let x = [(0..400).map(|n| reach * (0.1 * f64::from(n)).sin()).collect()];
+            surface(("q", &x), ("w", &x), radians).into_iter().map(|s| s.text).collect()
+        };
+        let has = |texts: &[String], text: &str| texts.iter().any(|t| t == text);
+        // A resistance that depends on the angle: half a turn is as likely as a whole one.
+        let radians = of(10.0, Some(1.0));
+        assert!(has(&radians, "sin(1.000100*q)*w") && has(&radians, "cos(2.000200*q)*sign(w)"), "{radians:?}");
+        assert!(has(&of(600.0, Some(1f64.to_radians())), "sin(0.0175*q)*w"));
+        // No angle, and one that does not go around: nothing is said of a turn.
+        assert_eq!(of(10.0, None).len(), of(1.0, Some(1.0)).len());
+        assert!(radians.len() > of(10.0, None).len());
+    }
 }

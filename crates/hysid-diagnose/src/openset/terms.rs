@@ -110,7 +110,12 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let plant = side == "plant";
         let inputs = if plant && !simulation.is_static() { simulation.inputs.as_slice() } else { &[] };
         expressions.extend(inputs.iter().map(|u| Expr::symbol(&u.symbol)));
+        let slot = structure.slots.iter().find(|s| s.label == label);
+        let radians = slot.and_then(|s| s.quantity("rad")).map(|q| q.expression.clone());
+        expressions.extend(radians.clone());
         let Some(mut series) = along(base, &expressions) else { continue };
+        // The same at every sample.
+        let radians = radians.and_then(|_| series.pop()?.first()?.first().copied());
         let inputs: Vec<(&str, Series)> =
             inputs.iter().map(|u| u.symbol.as_str()).zip(series.split_off(coordinates.len())).collect();
         let within: Arc<[Coordinate]> = coordinates
@@ -137,7 +142,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             }
         }
         if let ([(a, _, _), (b, _, _)], [x, v], true) = (coordinates.as_slice(), series.as_slice(), plant) {
-            found.extend(shapes::surface((a, x), (b, v)));
+            found.extend(shapes::surface((a, x), (b, v), radians));
         }
         work.extend(found.into_iter().map(|Shape { text, kind, series }| Signal {
             place,
