@@ -84,7 +84,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let (search, pool) = (&found.search, &found.pool);
     let (setting, best) = (&search.setting, &pool[judged.winner]);
     let wanders = judged.wanders().map(str::to_owned);
-    let Judgement { rest, uneven, wandering, lacking, cut_short, .. } = judged;
+    let Judgement { rest, uneven, wandering, lacking, cut_short, runs_away, .. } = judged;
     let spectrum = rest
         .spectrum
         .then_some("a memory with many time scales, a fractional element or a spectrum of relaxation times");
@@ -124,6 +124,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
     let varying = varying.or(wanders);
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
+    if runs_away {
+        file.summary = "The simulation runs away by itself: no free run of it can follow the recording, and nothing can be said of what it lacks.".into();
+        file.notes.push("a deviation of the initial state too small to be seen grows beyond the output within the recording, as in a plant that only a controller holds: put the controller into the simulation, with the reference as its input, or give many short recordings".into());
+    }
     if let Some(note) = budget.note() {
         if cut_short {
             file.summary = "Something is missing; the search was cut short by the time limit before an effect was found that explains it.".into();
@@ -178,7 +182,7 @@ fn statement(
         notes,
         seed,
     };
-    if *significant {
+    if *significant && !judged.runs_away {
         let contest = judged.contest(pool);
         file.alternatives = alternatives(&contest, judged.within);
         file.location = location(&pool[0], best, candidates);

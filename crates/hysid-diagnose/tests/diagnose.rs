@@ -2,6 +2,8 @@
 
 #[path = "diagnose/actuator.rs"]
 mod actuator;
+#[path = "diagnose/held.rs"]
+mod held;
 #[path = "common/oscillator.rs"]
 mod oscillator;
 #[path = "diagnose/sensed.rs"]

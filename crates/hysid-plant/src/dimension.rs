@@ -21,7 +21,7 @@ fn unit_of(simulation: &Simulation, expr: &Expr) -> Result<Option<Unit>, String>
                 (BinaryOp::Mul, Some(l), Some(r)) => Some(l.times(&r)),
                 (BinaryOp::Div, Some(l), Some(r)) => Some(l.per(&r)),
                 (BinaryOp::Pow, left, right) => {
-                    if let Some(r) = right.filter(|r| !r.is_dimensionless()) {
+                    if let Some(r) = right.filter(|r| r.clashes(&Unit::none())) {
                         return Err(format!("the exponent `{b}` has the unit {r}; an exponent is a pure number"));
                     }
                     match (left, &**b) {
@@ -40,7 +40,7 @@ fn unit_of(simulation: &Simulation, expr: &Expr) -> Result<Option<Unit>, String>
                 units.push(unit(argument)?);
             }
             let pure = |result: Option<Unit>| match (&units.first().cloned().flatten(), arguments.first()) {
-                (Some(u), Some(a)) if !u.is_dimensionless() => {
+                (Some(u), Some(a)) if u.clashes(&Unit::none()) => {
                     Err(format!("`{}` takes a pure number, but `{a}` has the unit {u}", function.name()))
                 }
                 _ => Ok(result),
@@ -80,7 +80,7 @@ fn unit_of(simulation: &Simulation, expr: &Expr) -> Result<Option<Unit>, String>
                     Ok(if *memory == Memory::Play { first_unit.clone() } else { Some(Unit::none()) })
                 }
                 Memory::Delay | Memory::Lag => match rest {
-                    [(argument, Some(u))] if !u.same_dimension(&seconds) => {
+                    [(argument, Some(u))] if u.clashes(&seconds) => {
                         Err(format!("`{}` takes seconds, but `{argument}` has the unit {u}", memory.name()))
                     }
                     _ => Ok(first_unit.clone()),
@@ -94,7 +94,7 @@ fn unit_of(simulation: &Simulation, expr: &Expr) -> Result<Option<Unit>, String>
 /// The common unit of two operands; the left one's name is kept where both are known.
 fn same(whole: &Expr, a: &Expr, left: Option<Unit>, b: &Expr, right: Option<Unit>) -> Result<Option<Unit>, String> {
     match (left, right) {
-        (Some(l), Some(r)) if !l.same_dimension(&r) => {
+        (Some(l), Some(r)) if l.clashes(&r) => {
             Err(format!("`{a}` has the unit {l} and `{b}` the unit {r} in `{whole}`"))
         }
         // `x + 1`: the literal takes the other's unit; an input's unit is not declared, so nothing is known for certain.
@@ -120,7 +120,7 @@ pub(crate) fn first_clash(simulation: &Simulation) -> Option<(String, String)> {
             } else {
                 continue;
             };
-            if !unit.same_dimension(&expected) {
+            if unit.clashes(&expected) {
                 return Some((key, format!("`{expr}` has the unit {unit}, but {expected} is needed")));
             }
         }

@@ -1,7 +1,8 @@
 //! Units as products of named factors (`N s/m`, `1/s^2`, `-`), with enough algebra to build new ones and to compare.
 //!
 //! A unit keeps the names that the user wrote. Two units are [comparable](Unit::same_dimension) when they reduce to the same
-//! dimension (`mm` and `m`, `N` and `kg m/s^2`); angles are dimensionless. A name that is not known is a dimension of its own.
+//! dimension (`mm` and `m`, `N` and `kg m/s^2`); angles are dimensionless. A name that is not known is a dimension of its own,
+//! of which nothing is certain: it [clashes](Unit::clashes) with nothing.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -53,6 +54,7 @@ const KNOWN: &[(&str, [i32; 5])] = &[
     ("V", [2, 1, -3, -1, 0]),
     ("Ohm", [2, 1, -3, -2, 0]),
     ("ohm", [2, 1, -3, -2, 0]),
+    ("S", [-2, -1, 3, 2, 0]),
     ("H", [2, 1, -2, -2, 0]),
     ("F", [-2, -1, 4, 2, 0]),
     ("C", [0, 0, 1, 1, 0]),
@@ -202,6 +204,13 @@ impl Unit {
     /// Whether both reduce to the same dimension; scale (`mm` against `m`) does not matter.
     pub fn same_dimension(&self, other: &Self) -> bool {
         self.dimension() == other.dimension()
+    }
+
+    /// Whether the two are certainly of different dimensions: they differ in what is known of them, and agree in the names that are not known (`psi`
+    /// against `lbf` or `Pa` may be right).
+    pub fn clashes(&self, other: &Self) -> bool {
+        let ((known, unknown), (others, strange)) = (self.dimension(), other.dimension());
+        unknown == strange && known != others
     }
 
     /// Whether the unit reduces to a pure number (`-`, `rad`, `mm/m`).

@@ -85,6 +85,10 @@ fn units_multiply_and_compare() {
     assert!(unit("N s/(cm V)").same_dimension(&unit("N s/mm").per(&unit("V"))));
     assert!(unit("rad/s").same_dimension(&unit("1/s")));
     assert!(!unit("N").same_dimension(&unit("N m")));
+    assert!(unit("S V").same_dimension(&unit("A")) && unit("mS").same_dimension(&unit("1/ohm")));
+    // Of a name that is not known nothing is certain, but for what stands beside it on both sides.
+    assert!(unit("N").clashes(&unit("N m")) && unit("psi m").clashes(&unit("psi")));
+    assert!(!unit("psi").clashes(&unit("Pa")) && !unit("N").clashes(&unit("kg m/s^2")));
     for (column, expected) in [
         ("v_cm_s", Some("cm/s")),
         ("force_N", Some("N")),

@@ -10,6 +10,7 @@
 
 use std::borrow::Cow;
 
+use super::runs;
 use crate::mechanism::band_but_for;
 
 /// Share of an output's power that may lie above the fastest frequency.
@@ -34,9 +35,12 @@ pub fn step<'a>(signals: impl Iterator<Item = &'a [f64]>, period_s: f64, samples
     by_band.min(samples / LEAST_ROWS).max(1)
 }
 
-/// Samples of a segment of the spectra by which feedback is seen, and the mean coherence beyond which it is.
-const SEGMENT: usize = 128;
+/// Most samples of a segment of the spectra by which feedback is seen, the least number of segments, and the mean coherence beyond which it is.
+const SEGMENT: usize = 512;
+const SEGMENTS: usize = 8;
 const COHERENT: f64 = 0.5;
+/// Share of an output's power that must lie above the frequencies that rows resolve: less is what the spectrum's window lets through of the motion.
+const NOISE: f64 = 1e-7;
 
 /// Whether input and output move together above the frequencies that rows of `step` samples resolve.
 ///
@@ -44,14 +48,16 @@ const COHERENT: f64 = 0.5;
 /// of both was. Rows would know the noise beforehand, and any fast path from the input to the output would predict it. Where nothing is coherent, as in
 /// an open loop whose output is noise up there, nothing is lost by means.
 pub fn together(u: &[f64], y: &[f64], step: usize) -> bool {
-    // Missing samples: no power where nothing was recorded.
-    let filled = |s: &[f64]| -> Vec<f64> { s.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect() };
-    let Ok(spectrum) = hysid_signal::cross_spectrum(&filled(u), &filled(y), 1.0, SEGMENT) else { return false };
-    let above: Vec<f64> = (spectrum.frequency_hz.iter().zip(spectrum.coherence()))
-        .filter(|(f, _)| **f > 0.5 / step as f64)
-        .map(|(_, c)| c)
-        .collect();
-    above.iter().sum::<f64>() > COHERENT * above.len() as f64
+    let present = u.iter().zip(y).map(|(u, y)| u.is_finite() && y.is_finite());
+    let Some(longest) = runs(present).into_iter().max_by_key(|r| r.len()) else { return false };
+    let segment = SEGMENT.min(longest.len() / SEGMENTS);
+    let Ok(spectrum) = hysid_signal::cross_spectrum(&u[longest.clone()], &y[longest], 1.0, segment) else {
+        return false;
+    };
+    let above = spectrum.frequency_hz.partition_point(|f| *f <= 0.5 / step as f64);
+    let power = |lines: &[f64]| lines.iter().sum::<f64>();
+    let coherence = &spectrum.coherence()[above..];
+    power(&spectrum.yy[above..]) > NOISE * power(&spectrum.yy) && power(coherence) > COHERENT * coherence.len() as f64
 }
 
 /// Means of the series over `step` samples about every `step`-th, the first one included; at the ends over those that there are.

@@ -25,7 +25,7 @@ pub enum Purpose {
 pub enum Form {
     /// A weight for each of a few terms, in place of a series with a few shape parameters: three plays for a smooth density.
     Few,
-    /// The series in another arrangement: plays that widen with the rate in place of a lag behind them.
+    /// The series in another arrangement: plays that widen with the rate in place of a lag behind them, powers about the point of operation.
     Smooth,
     /// More terms, for recordings that are sharp enough to tell: six plays in place of three, a lag that does not start settled.
     Finer,

@@ -7,6 +7,7 @@ mod adjoint;
 mod along;
 pub mod base;
 pub mod force;
+mod growth;
 pub mod hold;
 pub mod hypothesis;
 mod unknowns;

@@ -39,6 +39,8 @@ pub struct Judgement<'d> {
     pub veto: Option<&'static str>,
     /// Whether a mismatch is significant and time was up before a set was found that explains it.
     pub cut_short: bool,
+    /// Whether the simulation is so unstable that its free run follows no recording.
+    pub runs_away: bool,
     /// The verdict among the sets of the catalogue.
     pub within: VerdictKind,
     /// The verdict.
@@ -98,17 +100,22 @@ impl<'d> Judgement<'d> {
         let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
             || wandering.iter().flatten().any(|w| w.probability >= FIRM);
         let outside = elsewhere || rest.is_outside(&support, remaining.as_ref());
-        let veto = if winner > 0 { veto(best, least, worse_on_blocks(&blocks, winner)) } else { None };
+        let runs_away = pool[0].base.model.runs_away(&pool[0].base.fit.theta);
+        let veto = match winner {
+            0 => None,
+            _ if runs_away => Some("what no free run can follow tells nothing of a set of effects"),
+            _ => veto(best, least, worse_on_blocks(&blocks, winner)),
+        };
         if veto.is_some() {
             within = VerdictKind::Ambiguous;
             support.iter_mut().for_each(Support::weaken);
         }
-        let mut kind = if outside && !unfinished() { VerdictKind::NotInCatalogue } else { within };
+        let mut kind = if outside && !unfinished() && !runs_away { VerdictKind::NotInCatalogue } else { within };
         // What is significant stays so, though no set outweighs its price: the likeliest is told, neither believed nor written.
-        let mut told = winner;
+        let mut told = if runs_away { 0 } else { winner };
         if significant && kind == VerdictKind::NoSignificantMismatch {
             kind = VerdictKind::Ambiguous;
-            if let Some(likeliest) = likeliest(&weighed) {
+            if let Some(likeliest) = likeliest(&weighed).filter(|_| !runs_away) {
                 told = likeliest;
                 support = firmness(pool, &weighed, &probability, likeliest, true);
             }
@@ -127,6 +134,7 @@ impl<'d> Judgement<'d> {
             lacking,
             veto,
             cut_short,
+            runs_away,
             within,
             kind,
         }
@@ -134,7 +142,7 @@ impl<'d> Judgement<'d> {
 
     /// Whether a mismatch is significant that no set of the catalogue, nor any generic term, outweighs its price in explaining.
     pub fn unexplained(&self) -> bool {
-        self.within == VerdictKind::NoSignificantMismatch && self.kind == VerdictKind::Ambiguous
+        !self.runs_away && self.within == VerdictKind::NoSignificantMismatch && self.kind == VerdictKind::Ambiguous
     }
 
     /// The winner without the members in the place of which something wanders, as a place in the pool; the simulation as it is where the others were

@@ -1,6 +1,6 @@
 //! An input with a curved characteristic.
 
-use crate::mechanism::{Block, Family, Law, Mechanism, Need, anywhere};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
 /// An input with a curved characteristic.
@@ -11,8 +11,14 @@ pub static INPUT_POLYNOMIAL: Mechanism = Mechanism {
     places: &[Place::Input, Place::Between],
     applies: anywhere,
     already: &["u^2", "u^3", "u*u", "u*abs(u)"],
-    law: |_, _| {
-        Law::replace("u + b_2*u^2 + b_3*u^3").amplitude("b_2", "1/u", -1.0, 1.0).amplitude("b_3", "1/u^2", -1.0, 1.0)
+    law: |_, purpose| {
+        // Through zero; or about the point of operation, where the simulation's gain holds: about zero such a curve has an offset, which
+        // would count as an effect of its own.
+        let middle = purpose == Purpose::Form(Form::Smooth);
+        let law = Law::replace(if middle { "u + b_2*(u - u_o)^2 + b_3*(u - u_o)^3" } else { "u + b_2*u^2 + b_3*u^3" })
+            .amplitude("b_2", "1/u", -1.0, 1.0)
+            .amplitude("b_3", "1/u^2", -1.0, 1.0);
+        if middle { law.constant("u_o", "u", Grid::SignedQuantiles("u", vec![0.5])) } else { law }
     },
     contains: &[],
     confusable: &["quadratic_stiffness", "input_saturation"],
