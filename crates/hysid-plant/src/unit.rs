@@ -212,11 +212,6 @@ impl Unit {
         let ((known, unknown), (others, strange)) = (self.dimension(), other.dimension());
         unknown == strange && known != others
     }
-
-    /// Whether the unit reduces to a pure number (`-`, `rad`, `mm/m`).
-    pub fn is_dimensionless(&self) -> bool {
-        self.same_dimension(&Self::none())
-    }
 }
 
 impl Display for Unit {
