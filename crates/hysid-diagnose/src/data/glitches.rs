@@ -15,6 +15,8 @@ use crate::text::number;
 const BEYOND: f64 = 5.0;
 /// Steps of a converter that a deviation must have besides.
 const LEVELS: f64 = 3.0;
+/// Share of it by which a glitch stands off the straight course of the two samples before it, and of those behind it.
+const OFF_COURSE: f64 = 0.5;
 /// Largest share of samples that are wrong; more of them are a property of the noise.
 const MOST: f64 = 0.02;
 /// Standard deviation of a normal variable over its median size.
@@ -105,8 +107,15 @@ fn glitches(e: &[f64], y: &[f64]) -> Vec<(usize, f64)> {
     let stands_out = |n: &usize| {
         let size = sizes[n - 1];
         let beside = [n.wrapping_sub(2), *n].map(|i| sizes.get(i).copied().unwrap_or(0.0));
+        // What bends sharply goes on along its course on one side: a sensor that is blind to the sign turns at zero.
+        let before = n.checked_sub(2).map(|m| 2.0 * e[n - 1] - e[m]);
+        let after = e.get(n + 2).map(|further| 2.0 * e[n + 1] - further);
+        let off_course = |course: f64| (e[*n] - course) * deviation(*n).signum() > OFF_COURSE * size;
         // A step shows at both of its sides, and its neighbours differ.
-        size > least && beside.iter().all(|b| *b < size) && (e[n + 1] - e[n - 1]).abs() < size
+        size > least
+            && beside.iter().all(|b| *b < size)
+            && (e[n + 1] - e[n - 1]).abs() < size
+            && [before, after].into_iter().flatten().all(off_course)
     };
     let found: Vec<(usize, f64)> = inner.filter(stands_out).map(|n| (n, deviation(n))).collect();
     if scale > 0.0 && found.len() as f64 <= MOST * e.len() as f64 { found } else { Vec::new() }
@@ -158,6 +167,18 @@ mod tests {
         let levels: Vec<f64> = slow.iter().map(|x| x.round()).collect();
         let error: Vec<f64> = levels.iter().zip(0..).map(|(y, n)| y - 0.004 * f64::from(n)).collect();
         assert_eq!(glitches(&error, &levels).len(), 0);
+    }
+
+    /// Where a sensor is blind to the sign its output turns sharply at zero; a sample at the turn goes on along one of its sides.
+    #[test]
+    fn sharp_turns_are_no_glitches() {
+        let mut random = normal(4);
+        let mut swings: Vec<f64> = (0..3000)
+            .map(|n| (50.0 * (0.037 * f64::from(n)).sin() * (0.011 * f64::from(n)).cos()).abs() + 0.1 * random())
+            .collect();
+        assert_eq!(places(&swings), [0; 0]);
+        swings[1234] += 40.0;
+        assert_eq!(places(&swings), [1234]);
     }
 
     #[test]
