@@ -14,6 +14,7 @@
 //! (2009) 656-670 (densities that fall off); E. Della Torre, Magnetic Hysteresis, IEEE Press (1999) (normal ones).
 
 use crate::mechanism::path::with_duration;
+use crate::mechanism::play::moved_play;
 use crate::mechanism::{Form, Grid, Law, Purpose};
 
 /// Half-widths of a few plays as shares of half the input's range.
@@ -68,13 +69,9 @@ impl Plays {
         matches!(self.0, Purpose::Form(Form::Unsettled | Form::FinerUnsettled))
     }
 
-    /// A play of this half-width, as text: in the middle at the first sample, or where an input that came from `u_s` has moved it by then. The
-    /// first time is the time delayed by the whole recording.
+    /// A play of this half-width, as text: in the middle at the first sample, or where an input that came from `u_s` has moved it by then.
     pub fn play(self, radius: &str) -> String {
-        if !self.unsettled() {
-            return format!("play(u, {radius})");
-        }
-        format!("play(u + (1 - sign(t - delay(t, T_r)))*max(min(u_s - u, {radius}), -{radius}), {radius})")
+        if self.unsettled() { moved_play("u", radius, "u_s") } else { format!("play(u, {radius})") }
     }
 
     /// The input and, for each play, its weight times what `play` makes of its half-width less the input: for large swings the gain stays

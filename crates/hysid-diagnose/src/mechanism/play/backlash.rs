@@ -1,6 +1,8 @@
 //! Backlash in the drive, the transmission or the sensor's coupling.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, log_steps};
+use super::moved_play;
+use crate::mechanism::path::with_duration;
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_steps};
 use crate::slot::Place;
 
 /// Backlash in the drive, the transmission or the sensor's coupling.
@@ -27,13 +29,19 @@ pub static BACKLASH: Mechanism = Mechanism {
             }
         };
         let width = Grid::Reach(signal, log_steps(0.005, 0.5, 6));
+        let wide = |text: String| Law::replace(text).shape("r", signal, width.clone()).within(0.0, 3.0).neutral(0.0);
         match purpose {
             Purpose::Screening => {
                 Law::replace(format!("{signal} + w*(play({signal}, r) - {signal})")).weight().shape("r", signal, width)
             }
-            Purpose::Refit | Purpose::Form(_) => {
-                Law::replace(format!("play({signal}, r)")).shape("r", signal, width).within(0.0, 3.0).neutral(0.0)
-            }
+            // A machine that was at rest: a first value beyond the play has taken it along. On a drive that integrates the difference stays.
+            Purpose::Form(Form::Unsettled) => with_duration(wide(moved_play(signal, "r", "0"))),
+            // One that was moving already.
+            Purpose::Form(Form::FinerUnsettled) => with_duration(wide(moved_play(signal, "r", "w_s")))
+                .shape("w_s", signal, Grid::Values(vec![-2.0, 0.0, 2.0]))
+                .within(-10.0, 10.0)
+                .silent(),
+            Purpose::Refit | Purpose::Form(_) => wide(format!("play({signal}, r)")),
         }
     },
     contains: &[],
