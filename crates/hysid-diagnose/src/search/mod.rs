@@ -14,6 +14,7 @@ pub mod fitting;
 pub mod joint;
 pub mod numerics_check;
 pub mod peaks;
+pub mod profile;
 pub mod rehearsal;
 pub mod screen;
 pub mod second_look;

@@ -1,0 +1,137 @@
+//! Shapes that least squares cannot move (a moment, a period, a knee): the error as a function of one of them, the other unknowns following it.
+//!
+//! Along such a shape a fit has many minima, and a step that lowers the error ends in the nearest. So the response is simulated at many values of it, and
+//! at each the other unknowns take what the tangents of the fit can take up (the error left is that of a variable projection whose second half is
+//! linear). A run costs an eighth of a simulation in lanes, and no derivatives; only the lowest points are fitted.
+//!
+//! Reference: G. Golub, V. Pereyra, Separable nonlinear least squares: the variable projection method and its applications, Inverse Problems 19 (2003) R1-R26.
+
+use rayon::prelude::*;
+
+use crate::budget::Step;
+use crate::evidence::{Projector, norm2};
+use crate::mechanism::Shape;
+use crate::model::Model;
+use crate::model::base::Base;
+use crate::model::hypothesis::{Hypothesis, Setting};
+
+/// Values on either side of where the shape stands, over one spacing of its grid.
+const ASIDE: usize = 12;
+/// Scans, each over the two nearest values of the one before.
+const SCANS: usize = 4;
+/// Minima of the first scan that are followed.
+const FOLLOWED: usize = 2;
+/// Times that the other unknowns are fitted and the shape is scanned again.
+const ROUNDS: usize = 2;
+/// Iterations of a fit from the lowest point.
+const ITERATIONS: usize = 3;
+/// Log likelihood that a move must bring.
+const LEAST: f64 = 1e-3;
+
+/// Moves the shapes of a set's `index`-th effect that least squares cannot move to where the error is least in their neighbourhood.
+pub fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usize) {
+    let shapes: Vec<Shape> =
+        h.effects[index].written.shapes.iter().filter(|s| s.searched && s.grid.len() >= 3).cloned().collect();
+    for shape in &shapes {
+        for _ in 0..ROUNDS {
+            if setting.budget.omits(Step::Fits) {
+                return;
+            }
+            let fitted = lowest(setting, &h.base, shape).into_par_iter().filter_map(|value| {
+                let mut from = h.base.values();
+                from.parameters.insert(shape.name.clone(), value);
+                setting.fit(h.base.model.simulation(), &from, Some(&h.base.whitener), 1, ITERATIONS)
+            });
+            let all: Vec<_> = fitted.filter(|b| b.log_likelihood > h.base.log_likelihood + LEAST).collect();
+            match all.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)) {
+                Some(better) => h.base = better,
+                None => break,
+            }
+        }
+    }
+}
+
+/// Values of the shape at which the error is least, and less than where it stands; none where it cannot be told.
+fn lowest(setting: &Setting<'_>, base: &Base<'_>, shape: &Shape) -> Vec<f64> {
+    let Some(error) = Profile::of(setting, base, shape) else { return Vec::new() };
+    let here = error.here;
+    let Some(&now) = error.at(&[here]).first() else { return Vec::new() };
+    let step = spacing(&shape.grid, here) / ASIDE as f64;
+    let scanned = error.around(here, step, ASIDE);
+    let is_least = |i: usize| {
+        let neighbour = |j: Option<usize>| j.and_then(|j| scanned.get(j)).map_or(f64::INFINITY, |s: &(f64, f64)| s.1);
+        scanned[i].1 <= neighbour(i.checked_sub(1)) && scanned[i].1 <= neighbour(Some(i + 1))
+    };
+    let mut minima: Vec<(f64, f64)> = (0..scanned.len()).filter(|&i| is_least(i)).map(|i| scanned[i]).collect();
+    minima.sort_by(|a, b| a.1.total_cmp(&b.1));
+    minima.truncate(FOLLOWED);
+    let finer = minima.into_iter().map(|mut least| {
+        let mut step = step;
+        for _ in 1..SCANS {
+            let nearest = error.around(least.0, step / 4.0, 3);
+            least = nearest.into_iter().fold(least, |a, b| if b.1 < a.1 { b } else { a });
+            step /= 4.0;
+        }
+        least
+    });
+    finer.filter(|least| least.1 < now).map(|least| least.0).collect()
+}
+
+/// The spacing of a grid in ascending order where a value stands.
+fn spacing(grid: &[f64], value: f64) -> f64 {
+    let above = grid.partition_point(|g| *g <= value).clamp(1, grid.len() - 1);
+    grid[above] - grid[above - 1]
+}
+
+/// The error of a fit as a function of one shape.
+struct Profile<'a, 'd> {
+    base: &'a Base<'d>,
+    /// The simulation in which the shape is a number.
+    model: Model<'d>,
+    name: &'a str,
+    /// Where it stands, and its bounds.
+    here: f64,
+    bounds: (f64, f64),
+    /// What the other unknowns can take up.
+    others: Projector,
+}
+
+impl<'a, 'd> Profile<'a, 'd> {
+    fn of(setting: &Setting<'d>, base: &'a Base<'d>, shape: &'a Shape) -> Option<Self> {
+        let mut document = base.model.simulation().clone();
+        let parameter = document.parameter_mut(&shape.name)?;
+        let bounds = (parameter.lower(), parameter.upper());
+        parameter.fixed = true;
+        let model = Model::new(&document, setting.data, setting.substeps).ok()?;
+        let place = base.model.place_of(&shape.name)?;
+        let layout = &setting.data.layout;
+        let columns = base.fit.jacobian.iter().enumerate().filter(|(i, _)| *i != place);
+        let others = Projector::new(columns.map(|(_, c)| base.whitener.apply(layout, c)));
+        Some(Self { base, model, name: &shape.name, here: base.fit.theta[place], bounds, others })
+    }
+
+    /// The error at these values: the sum of squares that the other unknowns leave; infinite where the simulation diverges.
+    fn at(&self, values: &[f64]) -> Vec<f64> {
+        let data = self.model.data();
+        let theta = self.model.theta(&self.base.values());
+        let settings: Vec<Vec<(String, f64)>> = values.iter().map(|v| vec![(self.name.to_owned(), *v)]).collect();
+        let runs = self.model.tangents_with(&theta, &[], &settings);
+        let left = |run: Option<(Vec<f64>, Vec<Vec<f64>>)>| {
+            let (prediction, _) = run?;
+            let residual: Vec<f64> = data.y.iter().zip(&prediction).map(|(y, p)| y - p).collect();
+            let mut white = self.base.whitener.apply(&data.layout, &residual);
+            self.others.remove(&mut white);
+            Some(norm2(&white)).filter(|e| e.is_finite())
+        };
+        runs.into_iter().map(|run| left(run).unwrap_or(f64::INFINITY)).collect()
+    }
+
+    /// The error at so many values on either side of one, with their distance, within the bounds.
+    fn around(&self, middle: f64, step: f64, aside: usize) -> Vec<(f64, f64)> {
+        let (low, high) = self.bounds;
+        let all = (0..=2 * aside).map(|i| middle + (i as f64 - aside as f64) * step);
+        let values: Vec<f64> = all.filter(|v| (low..=high).contains(v)).collect();
+        let errors = self.at(&values);
+        values.into_iter().zip(errors).collect()
+    }
+}
