@@ -63,7 +63,7 @@ impl<'d> Judgement<'d> {
         // Under a noise of its own a simulation may leave more than it has to.
         let least = least.as_ref().unwrap_or(&pool[0]);
         let standing = standing(pool, least).filter(|_| significant);
-        let preferred = standing.map_or(0, |s| tie_broken(pool, s, &blocks));
+        let preferred = standing.map_or(0, |s| tie_broken(pool, &weighed, s, &blocks));
         let (winner, trifles) = without_trifles(pool, preferred, least);
         if winner != preferred {
             blocks[winner] = block_score(setting, &pool[winner]);

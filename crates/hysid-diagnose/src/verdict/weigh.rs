@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-use super::{Claim, FIRM, Hypothesis as Weighed};
+use super::{Claim, FIRM, Hypothesis as Weighed, probabilities};
 use crate::budget::Step;
 use crate::evidence::{difference, norm2};
 use crate::model::base::Base;
@@ -110,17 +110,55 @@ pub fn standing(pool: &[Hypothesis<'_>], least: &Hypothesis<'_>) -> Option<usize
     explaining.max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence)).or(Some(standing))
 }
 
-/// The standing set, or one of its size that ties in evidence and predicts the held-out blocks better.
-pub fn tie_broken(pool: &[Hypothesis<'_>], standing: usize, blocks: &[Option<(f64, Vec<f64>)>]) -> usize {
+/// Log evidence within which sets of one size tie, and log likelihood of the held-out blocks by which one of them must lead to be preferred.
+const TIE: f64 = 3.0;
+
+/// The standing set, or one of its size that ties in evidence and predicts the held-out blocks better; of those that tie, the best whose families are the
+/// likeliest by all that was fitted: what is told first must not be what the alternatives outweigh.
+pub fn tie_broken(
+    pool: &[Hypothesis<'_>],
+    weighed: &[Weighed],
+    standing: usize,
+    blocks: &[Option<(f64, Vec<f64>)>],
+) -> usize {
     let score = |i: usize| blocks[i].as_ref().map_or(f64::NEG_INFINITY, |b| b.0);
-    (0..pool.len())
+    let tying: Vec<usize> = (0..pool.len())
         .filter(|&i| {
             pool[i].effects.len() == pool[standing].effects.len()
-                && pool[i].log_evidence > pool[standing].log_evidence - 3.0
+                && pool[i].log_evidence > pool[standing].log_evidence - TIE
         })
-        .filter(|&i| i == standing || score(i) > score(standing) + 3.0)
-        .max_by(|&a, &b| score(a).total_cmp(&score(b)))
-        .unwrap_or(standing)
+        .collect();
+    let by_blocks = |among: &[usize], first: usize| {
+        let better = among.iter().copied().filter(|&i| i == first || score(i) > score(first) + TIE);
+        better.max_by(|&a, &b| score(a).total_cmp(&score(b))).unwrap_or(first)
+    };
+    let preferred = by_blocks(&tying, standing);
+    let probability = probabilities(&log_weights(pool, weighed, blocks, preferred, EVIDENCE_WEIGHT), 1.0);
+    let families = likeliest_families(&tying, preferred, weighed, &probability);
+    let agreeing: Vec<usize> = tying.into_iter().filter(|&i| pool[i].families() == families).collect();
+    let first = agreeing.iter().copied().max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence));
+    first.map_or(preferred, |first| by_blocks(&agreeing, first))
+}
+
+/// Of some sets the families of the one whose families have the most probability together; those of `preferred` where no others have more.
+fn likeliest_families(sets: &[usize], preferred: usize, weighed: &[Weighed], probability: &[f64]) -> Vec<&'static str> {
+    let families = |i: usize| {
+        let mut all: Vec<&'static str> = weighed[i].claims.iter().map(|c| c.family).collect();
+        all.sort_unstable();
+        all
+    };
+    let mass = |wanted: &[&str]| -> f64 {
+        let all = |i: &usize| wanted.iter().all(|f| weighed[*i].claims.iter().any(|c| c.family == *f));
+        (0..weighed.len()).filter(all).map(|i| probability[i]).sum()
+    };
+    let mut best = (families(preferred), mass(&families(preferred)));
+    for &i in sets {
+        let (theirs, of_theirs) = (families(i), mass(&families(i)));
+        if of_theirs > best.1 {
+            best = (theirs, of_theirs);
+        }
+    }
+    best.0
 }
 
 /// Whether the winner predicts the held-out blocks worse than the simulation as it is, by more than a standard error: an effect that acts at a few
@@ -278,6 +316,22 @@ mod tests {
         assert!(!judged(none.iter().enumerate().map(|(i, e)| e + if i % 40 < 20 { 0.1 } else { -0.099 }).collect()));
         assert!(!judged(none.iter().map(|e| 0.8 * e).collect()));
         assert!(judged(none.iter().map(|e| 1.2 * e).collect()));
+    }
+
+    #[test]
+    fn what_is_told_first_is_not_outweighed_by_the_alternatives() {
+        let claim = |mechanism, family| Claim { mechanism, family, slot: "state:v".into() };
+        let set = |claims: &[Claim]| Weighed { claims: claims.to_vec(), log_evidence: 0.0 };
+        let (pinching, dahl) = (claim("pinching", "hysteretic_spring"), claim("dahl_friction", "presliding"));
+        let (lugre, delay) = (claim("lugre_friction", "presliding"), claim("delay", "signal_path_lag"));
+        let alone = [set(&[pinching.clone()]), set(&[dahl.clone()]), set(&[lugre])];
+        let told = |p: [f64; 3]| likeliest_families(&[0, 1], 0, &alone, &p);
+        assert_eq!(told([0.4, 0.3, 0.3]), ["presliding"]);
+        assert_eq!(told([0.6, 0.2, 0.2]), ["hysteretic_spring"]);
+        assert_eq!(told([0.5, 0.25, 0.25]), ["hysteretic_spring"]);
+        // A set of more effects says the same of the families that it shares.
+        let pairs = [set(&[pinching, delay.clone()]), set(&[delay.clone(), dahl.clone()]), set(&[dahl, delay])];
+        assert_eq!(likeliest_families(&[0, 1, 2], 0, &pairs, &[0.4, 0.3, 0.3]), ["presliding", "signal_path_lag"]);
     }
 
     /// A small offset of a sensor and one of the input leave the same; a spring that bends says something else.
