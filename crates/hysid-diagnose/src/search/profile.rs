@@ -135,3 +135,71 @@ impl<'a, 'd> Profile<'a, 'd> {
         values.into_iter().zip(errors).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::Budget;
+    use crate::model::Values;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use crate::search::fitting::refit;
+    use crate::search::screen::{Candidate, screen};
+    use hysid_plant::Simulation;
+
+    /// The spring of the oscillator with a further stiffness beyond a knee, in metres, and its candidate in the screening.
+    fn with_a_knee(knee: f64, check: impl FnOnce(&Setting<'_>, &Hypothesis<'_>, &Candidate)) {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut random = normal(6);
+        let u = drive(900, &mut random);
+        let mut y = respond(&u, REAL, |x, _| 60.0 * (x - knee).max(0.0));
+        let noise = 0.01 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * random());
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let found =
+            screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| m.id == "bilinear_stiffness");
+        check(&setting, &none, &found[0]);
+    }
+
+    /// Beside a fit of all the others with the shape held, iterated to its end.
+    #[test]
+    fn the_profile_is_the_error_with_the_others_refitted() {
+        with_a_knee(0.08, |setting, none, candidate| {
+            let h = refit(setting, none, candidate).unwrap();
+            let shape = &h.effects[0].written.shapes[0];
+            let profile = Profile::of(setting, &h.base, shape).unwrap();
+            let step = 0.2 * spacing(&shape.grid, profile.here);
+            for value in [profile.here, profile.here - step, profile.here + step] {
+                let mut held = h.base.model.simulation().clone();
+                held.parameter_mut(&shape.name).unwrap().fixed = true;
+                held.parameter_mut(&shape.name).unwrap().value = value;
+                let mut from = h.base.values();
+                from.parameters.insert(shape.name.clone(), value);
+                let fitted = setting.fit(&held, &from, Some(&h.base.whitener), 1, 30).unwrap();
+                let white = h.base.whitener.apply(&setting.data.layout, &fitted.fit.residual);
+                let (exact, found) = (norm2(&white), profile.at(&[value])[0]);
+                assert!((found / exact - 1.0).abs() < 0.01, "{value}: {found} for {exact}");
+            }
+        });
+    }
+
+    #[test]
+    fn a_knee_is_found_from_a_spacing_away() {
+        let knee = 0.08;
+        with_a_knee(knee, |setting, none, candidate| {
+            let mut h = refit(setting, none, candidate).unwrap();
+            let shape = h.effects[0].written.shapes[0].clone();
+            let away = knee - 0.8 * spacing(&shape.grid, knee);
+            let mut from: Values = h.base.values();
+            from.parameters.insert(shape.name.clone(), away);
+            h.base = setting.fit(h.base.model.simulation(), &from, None, 1, 0).unwrap();
+            let before = h.base.log_likelihood;
+            profile_shapes(setting, &mut h, 0);
+            let found = h.base.values().parameters[&shape.name];
+            assert!((found - knee).abs() < 0.01 && h.base.log_likelihood > before, "{found}, from {away}");
+        });
+    }
+}
