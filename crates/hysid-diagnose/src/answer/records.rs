@@ -229,18 +229,17 @@ pub fn absorbing(base: &Base<'_>, simulation: &Simulation) -> Vec<String> {
     out
 }
 
+/// Probability below which a rival is not told in the summary.
+const WORTH_TELLING: f64 = 0.005;
+
 /// The verdict in a sentence or two; `varying` says what varies, where a correction without a name says so, `unequal` which strength may depend on
 /// the motion.
 pub fn summary(file: &DiagnosisFile, varying: Option<&str>, unequal: Option<&str>) -> String {
     let sentences = || file.effects.iter().map(|e| e.sentence.clone()).collect::<Vec<_>>().join(" ");
-    let rivals = || {
-        file.alternatives
-            .iter()
-            .take(3)
-            .map(|a| format!("{} at {} ({:.0} %)", a.mechanism, a.slot, 100.0 * a.probability))
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
+    let rivals: Vec<String> = (file.alternatives.iter().take(3))
+        .filter(|a| a.probability >= WORTH_TELLING)
+        .map(|a| format!("{} at {} ({:.0} %)", a.mechanism, a.slot, 100.0 * a.probability))
+        .collect();
     match file.verdict {
         VerdictKind::NoSignificantMismatch => {
             "The recalibrated simulation and the recording differ by no more than the noise.".into()
@@ -255,7 +254,14 @@ pub fn summary(file: &DiagnosisFile, varying: Option<&str>, unequal: Option<&str
         }
         VerdictKind::Ambiguous => {
             let or = unequal.map_or_else(String::new, |u| format!(", or a law that the catalogue does not have ({u})"));
-            format!("Several explanations remain: {}{or}. The likeliest set: {}", rivals(), sentences())
+            match rivals.as_slice() {
+                [] | [_] if or.is_empty() => format!("Not firm, and no rival of weight: {}", sentences()),
+                _ => format!(
+                    "Several explanations remain: {}{or}. The likeliest set: {}",
+                    rivals.join(", "),
+                    sentences()
+                ),
+            }
         }
         VerdictKind::NotInCatalogue => match varying.or(unequal) {
             Some(varying) => {

@@ -19,10 +19,27 @@ pub struct FreeRun {
     pub scored: Vec<bool>,
 }
 
-/// Runs a fitted simulation on data that it was not fitted to. Free initial states are estimated on the first [`HEAD`] of each stretch.
+/// Relative change of an output on twice as many integration steps that a score allows.
+const STEP_TOLERANCE: f64 = 1e-5;
+
+/// The integration steps in each sampling period that a simulation needs on its data, from where it starts of itself.
+fn steps_needed(model: &Model<'_>) -> usize {
+    let theta = model.theta(&Values::default());
+    let parameters = model.parameters(&theta, &[]);
+    let needed = |stretch: usize| {
+        let start = model.start_of(stretch, &theta);
+        let run = model.run_of(stretch, &parameters, &start);
+        model.compiled.check_steps(run.drive, run.theta, run.start, STEP_TOLERANCE).substeps
+    };
+    (0..model.data.stretches.len()).map(needed).max().unwrap_or(1)
+}
+
+/// Runs a fitted simulation on data that it was not fitted to, with at least so many integration steps in each sampling period: a recording of another
+/// level may need more than those that it was fitted to. Free initial states are estimated on the first [`HEAD`] of each stretch.
 pub fn free_run(document: &Simulation, data: &DataSet, substeps: usize) -> Option<FreeRun> {
     let mut fixed = document.clone();
     fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
+    let substeps = steps_needed(&Model::new(&fixed, data, substeps).ok()?).max(substeps);
     let head = data.head(HEAD);
     let model = Model::new(&fixed, &head, substeps).ok()?;
     let free = !model.unknowns().is_empty();

@@ -24,8 +24,8 @@ mod tests {
         for from in [-9.0, 0.0, 1.9, 2.5, 9.0] {
             let law = moved_play("u", "r", "w_s");
             let text = format!(
-                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_V\"\n[parameters]\nr = {{ value = {radius} }}\nw_s = {{ value = {from:?} }}\n\
-                 T_r = {{ value = {duration} }}\n[outputs]\ny_V = \"{law}\"\n"
+                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_V\"\n[parameters]\nr = {{ value = {radius}, fixed = true }}\nw_s = {{ value = {from:?}, fixed = true }}\n\
+                 T_r = {{ value = {duration}, fixed = true }}\n[outputs]\ny_V = \"{law}\"\n"
             );
             let compiled = Compiled::new(&Simulation::parse(&text, "play.sim.toml").unwrap()).unwrap();
             let drive = Drive::new(3.0, 0.01, input.len(), vec![input.clone()]).unwrap();
