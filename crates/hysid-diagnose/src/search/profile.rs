@@ -126,7 +126,7 @@ impl<'a, 'd> Profile<'a, 'd> {
         runs.into_iter().map(|run| left(run).unwrap_or(f64::INFINITY)).collect()
     }
 
-    /// The error at so many values on either side of one, with their distance, within the bounds.
+    /// So many values on either side of one, a step apart and within the bounds, each with its error.
     fn around(&self, middle: f64, step: f64, aside: usize) -> Vec<(f64, f64)> {
         let (low, high) = self.bounds;
         let all = (0..=2 * aside).map(|i| middle + (i as f64 - aside as f64) * step);
