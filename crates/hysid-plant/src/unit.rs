@@ -4,20 +4,26 @@
 //! dimension (`mm` and `m`, `N` and `kg m/s^2`); angles are dimensionless. A name that is not known is a dimension of its own,
 //! of which nothing is certain: it [clashes](Unit::clashes) with nothing.
 
+mod parse;
+
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 
 use hysid_signal::tell::brief;
 
-/// A product of named factors with exponents that are whole or halves.
+/// A product of named factors with exponents that are multiples of a sixtieth.
 ///
-/// Text form: factors separated by spaces, `*` or `.`; at most one `/`, after which every factor divides (parentheses around
-/// them are allowed); `^` before an exponent (`cm^2.5/s`); `-` or `1` or nothing is dimensionless.
+/// Text form: factors separated by spaces, `*`, `.`, `·` or `-`; behind a `/` every factor divides (`W/m^2/K`, `J/kg K`), but for what stands in
+/// parentheses (`V/(rad/s)`); `^`, `**` or raised digits before an exponent (`cm^2.5/s`, `m^(1/3)`, `kg·m²`), also behind parentheses
+/// (`N*(s/m)^0.6`); `m3` is `m^3`; `sqrt(m)`; `-` or `1` or nothing is dimensionless.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Unit {
-    /// Names with their exponents in halves.
+    /// Names with their exponents in units of [`ONE`].
     factors: Vec<(String, i32)>,
 }
+
+/// The exponent one: whole numbers, halves, thirds, quarters, fifths and tenths are multiples of its parts.
+const ONE: i32 = 60;
 
 /// Why a text is not a unit.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -29,7 +35,7 @@ pub struct UnitError {
     pub reason: &'static str,
 }
 
-/// The base dimensions, as exponents by name, in halves where they are those of a [`Unit`].
+/// The base dimensions, as exponents by name, in units of [`ONE`] where they are those of a [`Unit`].
 type Dimension = BTreeMap<&'static str, i32>;
 
 /// Known names: exponents of (m, kg, s, A, K).
@@ -90,62 +96,10 @@ impl Unit {
         Self::default()
     }
 
-    /// The unit that `text` stands for.
-    ///
-    /// # Errors
-    /// A character or an exponent that does not belong there, or a second `/`.
-    pub fn parse(text: &str) -> Result<Self, UnitError> {
-        let fail = |reason| UnitError { text: text.to_owned(), reason };
-        let trimmed = text.trim();
-        if matches!(trimmed, "" | "-" | "1") {
-            return Ok(Self::none());
-        }
-        let mut halves = trimmed.split('/');
-        let above = halves.next().unwrap_or_default();
-        let below = halves.next();
-        if halves.next().is_some() {
-            return Err(fail("it has more than one `/`"));
-        }
-        let mut unit = Self::none();
-        for (half, sign) in [(Some(above), 1), (below, -1)] {
-            let Some(half) = half else { continue };
-            let mut half = half.trim();
-            if let Some(inner) = half.strip_prefix('(').and_then(|h| h.strip_suffix(')')) {
-                half = inner.trim();
-            }
-            if half.is_empty() {
-                return Err(fail("a factor is missing beside the `/`"));
-            }
-            for factor in factors(half) {
-                if factor == "1" {
-                    continue;
-                }
-                let (name, exponent) = match factor.split_once('^') {
-                    None => (factor, 1.0),
-                    Some((name, exponent)) => {
-                        (name, exponent.parse::<f64>().map_err(|_| fail("an exponent is not a number"))?)
-                    }
-                };
-                let halves = 2.0 * exponent;
-                if !(exponent != 0.0 && exponent.abs() <= 12.0) {
-                    return Err(fail("an exponent is 0 or larger than 12"));
-                }
-                if halves.fract() != 0.0 {
-                    return Err(fail("only whole exponents and halves such as 0.5 or 2.5 are read"));
-                }
-                if name.is_empty() || !name.chars().all(|c| c.is_alphabetic() || matches!(c, '%' | '_' | '°')) {
-                    return Err(fail("a factor is not a name"));
-                }
-                unit.multiply(name, sign * halves as i32);
-            }
-        }
-        Ok(unit)
-    }
-
-    fn multiply(&mut self, name: &str, halves: i32) {
+    fn multiply(&mut self, name: &str, exponent: i32) {
         match self.factors.iter_mut().find(|(n, _)| n == name) {
-            Some((_, e)) => *e = e.saturating_add(halves),
-            None => self.factors.push((name.to_owned(), halves)),
+            Some((_, e)) => *e = e.saturating_add(exponent),
+            None => self.factors.push((name.to_owned(), exponent)),
         }
         self.factors.retain(|(_, e)| *e != 0);
     }
@@ -173,7 +127,7 @@ impl Unit {
     /// The square root, where every exponent is even; elsewhere it is left open, so that a coefficient before a root whose unit was not
     /// thought out clashes with nothing.
     pub fn root(&self) -> Option<Self> {
-        let roots = self.factors.iter().map(|(n, e)| (e % 4 == 0).then(|| (n.clone(), e / 2)));
+        let roots = self.factors.iter().map(|(n, e)| (e % (2 * ONE) == 0).then(|| (n.clone(), e / 2)));
         Some(Self { factors: roots.collect::<Option<_>>()? })
     }
 
@@ -221,9 +175,9 @@ impl Display for Unit {
         }
         let side = |positive: bool| {
             let chosen = self.factors.iter().filter(|(_, e)| (*e > 0) == positive);
-            let text = chosen.map(|(name, halves)| match halves.unsigned_abs() {
-                2 => name.clone(),
-                halves => format!("{name}^{}", f64::from(halves) / 2.0),
+            let text = chosen.map(|(name, exponent)| match exponent.abs() {
+                ONE => name.clone(),
+                exponent => format!("{name}^{}", f64::from(exponent) / f64::from(ONE)),
             });
             text.collect::<Vec<_>>()
         };
@@ -245,7 +199,7 @@ impl Unit {
         let parts: Vec<&str> = column.split('_').skip(1).collect();
         let (&last, before) = parts.split_last()?;
         let quotient = |(above, power): (&str, i32), (below, per): (&str, i32)| Self {
-            factors: vec![(above.to_owned(), 2 * power), (below.to_owned(), -2 * per)],
+            factors: vec![(above.to_owned(), ONE * power), (below.to_owned(), -ONE * per)],
         };
         let above = before.last().copied().unwrap_or_default();
         // A time after a unit divides by it; alone it is a time.
@@ -267,28 +221,8 @@ impl Unit {
             _ => {}
         }
         // `x_m2` is more likely the place of a second mass than an area.
-        exponents(last).map(|_| Self { factors: vec![(last.to_owned(), 2)] })
+        exponents(last).map(|_| Self { factors: vec![(last.to_owned(), ONE)] })
     }
-}
-
-/// The factors of a product; a point between two digits belongs to an exponent.
-fn factors(product: &str) -> Vec<&str> {
-    let bytes = product.as_bytes();
-    let digit = |at: Option<usize>| at.and_then(|i| bytes.get(i)).is_some_and(u8::is_ascii_digit);
-    let parts = |(at, c): (usize, char)| match c {
-        ' ' | '*' | '·' => true,
-        '.' => !(digit(at.checked_sub(1)) && digit(Some(at + 1))),
-        _ => false,
-    };
-    let mut out = Vec::new();
-    let mut from = 0;
-    for (at, c) in product.char_indices().filter(|found| parts(*found)) {
-        out.push(&product[from..at]);
-        from = at + c.len_utf8();
-    }
-    out.push(&product[from..]);
-    out.retain(|f| !f.is_empty());
-    out
 }
 
 /// A known name with the power that may follow it: `m3` is a cubic metre.
