@@ -42,12 +42,12 @@ impl Design {
                 }
             }
             Law::Stribeck => {
-                vec![if drive { 0.0 } else { force }, force * r.uniform(0.4, 1.2), s.v * r.log_uniform(0.08, 0.4)]
+                vec![if drive { 0.0 } else { force }, force * r.uniform(0.4, 1.2), s.v * r.log_uniform(0.05, 0.5)]
             }
             Law::LoadDependent => vec![force / s.u],
             Law::Dahl | Law::LuGre | Law::Elastoplastic => {
                 let size = if drive { self.theta[2] } else { force };
-                let z = s.q * if drive { 1.0 } else { r.log_uniform(0.03, 0.2) };
+                let z = s.q * if drive { 1.0 } else { r.log_uniform(0.005, 0.4) };
                 if drive {
                     scaled = Some(match law {
                         Law::LuGre => vec![3],
@@ -66,10 +66,14 @@ impl Design {
             }
             Law::SquareRootDamping => vec![force / s.v.sqrt()],
             Law::DisplacementDamping => vec![force / (s.q.powi(2) * s.v)],
-            Law::GapStop => vec![3.0 * force / s.q, s.q_max * r.uniform(0.45, 0.75)],
+            Law::GapStop => vec![3.0 * force / s.q, s.q_max * r.uniform(0.3, 0.8)],
             Law::Bilinear => vec![force / s.q, s.q * r.uniform(-0.3, 0.6)],
             Law::SpringClearance => vec![s.q],
-            Law::BoucWen => vec![force, s.q * r.log_uniform(0.3, 1.5), r.uniform(0.3, 0.7), r.pick(&[1.0, 2.0])],
+            Law::BoucWen => {
+                // b = beta/(beta + gamma), gamma/beta from -0.8 to 1.
+                let b = 1.0 / (1.0 + r.uniform(-0.8, 1.0));
+                vec![force, s.q * r.log_uniform(0.15, 3.0), b, r.pick(&[1.0, 1.5, 2.0, 3.0])]
+            }
             Law::AsymmetricBoucWen => {
                 vec![force, s.q * r.log_uniform(0.3, 1.2), r.uniform(0.5, 0.8), 1.0, r.uniform(0.1, 0.25) * r.sign()]
             }
@@ -112,9 +116,9 @@ impl Design {
                 theta = self.varying(law, r);
                 match law {
                     Law::Drift => vec![r.sign(), s.length],
-                    Law::Heating => vec![1.0, s.length * r.log_uniform(0.05, 0.4), self.power(&s)],
+                    Law::Heating => vec![1.0, s.length * r.log_uniform(0.05, 1.0), self.power(&s)],
                     Law::AbruptChange => {
-                        let at = (r.uniform(0.3, 0.7) * self.samples as f64).floor();
+                        let at = (r.uniform(0.15, 0.85) * self.samples as f64).floor();
                         vec![r.sign(), at * s.period]
                     }
                     Law::RandomWalk => vec![1.0, 1.0 + r.below(1 << 20) as f64, s.length],
@@ -126,12 +130,12 @@ impl Design {
                     Kind::TwoMasses | Kind::ThreeMasses => self.theta[3 * dof],
                     _ => self.theta[0],
                 };
-                vec![mass, self.band.1 * r.uniform(0.3, 0.9), r.log_uniform(0.01, 0.1)]
+                vec![mass, self.band.1 * r.uniform(0.3, 1.0), r.log_uniform(0.004, 0.15)]
             }
             Law::InputOffset => vec![s.u * r.sign()],
             Law::OutputOffset => vec![s.y * r.sign()],
             Law::Gravity if s.q_max > 0.8 => vec![force, 0.0],
-            Law::Cogging => vec![force, s.q_max * r.uniform(0.25, 0.7), r.uniform(0.0, TAU)],
+            Law::Cogging => vec![force, s.q_max * r.log_uniform(0.1, 0.7), r.uniform(0.0, TAU)],
             Law::PositionInertia => vec![self.theta[0] / (s.q * s.q)],
             Law::Viscoelastic => vec![force / s.q, r.log_uniform(0.3, 3.0) * s.q / s.v],
             Law::LogCreep => {
