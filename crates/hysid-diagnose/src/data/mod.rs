@@ -123,6 +123,12 @@ impl DataSet {
         self.y.len()
     }
 
+    /// Share of the rows that lie before a moment, in seconds on the recordings' clock.
+    pub fn share_before(&self, moment_s: f64) -> f64 {
+        let before = |s: &Series| self.time_of_rows(s).filter(|t| *t < moment_s).count();
+        self.layout.series.iter().map(before).sum::<usize>() as f64 / self.rows().max(1) as f64
+    }
+
     /// Stacks simulated outputs (`outputs[stretch][output][sample]`) in the order of the rows.
     pub fn stack(&self, outputs: &[Vec<Vec<f64>>]) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.rows());
@@ -285,6 +291,25 @@ fn runs(good: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
         out.push(s..n);
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::samples::{ramp, recording, simulation};
+    use super::*;
+
+    #[test]
+    fn the_share_before_a_moment_counts_the_rows_of_all_recordings() {
+        let both = [recording(ramp(100), ramp(100)), recording(ramp(300), ramp(300))];
+        let data = DataSet::new(&simulation(), &both, 3).unwrap();
+        // Both begin at zero, with a sample in each tenth of a second.
+        let check = |moment: f64, rows: usize| assert_eq!(data.share_before(moment), rows as f64 / 400.0, "{moment}");
+        check(-1.0, 0);
+        check(2.05, 42);
+        check(9.95, 200);
+        check(20.05, 301);
+        check(99.0, 400);
+    }
 }
 
 /// What the tests of this module share.

@@ -41,7 +41,8 @@ specimens!(
     "cylinder",
     "shaker",
     "shaft",
-    "stage"
+    "stage",
+    "brace"
 );
 
 /// A breach of the suite's laws.
@@ -213,6 +214,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.0004, 10.0),
     (0.01, 1.0),
     (0.01, 4.0),
+    (0.002, 20.0),
 ];
 
 /// A bench for each specimen.

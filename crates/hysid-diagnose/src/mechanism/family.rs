@@ -147,6 +147,27 @@ impl Family {
         matches!(self, Self::DryFriction | Self::Presliding | Self::HystereticSpring)
     }
 
+    /// Whether its members are linear or follow the clock, as the machine's own noise: behind a sensor that is blind to the sign that noise turns its sign
+    /// with the motion, and no noise model knows it.
+    pub fn adds_what_noise_does(self) -> bool {
+        self.extends_a_spectrum()
+            || self.is_slow_noise()
+            || matches!(self, Self::LinearMemory | Self::ExternalDisturbance)
+    }
+
+    /// Whether its members remember where they came from: how they begin nobody knows.
+    pub fn has_memory(self) -> bool {
+        matches!(
+            self,
+            Self::Presliding
+                | Self::HystereticSpring
+                | Self::Play
+                | Self::ActuatorHysteresis
+                | Self::LinearMemory
+                | Self::AeroMemory
+        )
+    }
+
     /// Whether its members are what noise of low frequency does, a zero that moves or stands elsewhere: no noise model of a recording's own length can tell.
     pub fn is_slow_noise(self) -> bool {
         matches!(self, Self::SensorDrift | Self::Bias)

@@ -7,6 +7,8 @@ pub enum Grid {
     Values(Vec<f64>),
     /// These shares of half the range of a slot's signal.
     Reach(&'static str, Vec<f64>),
+    /// The same, and the periods over that signal to which the residual points.
+    Turns(&'static str, Vec<f64>),
     /// Quantiles of the absolute value of a slot's signal.
     Quantiles(&'static str, Vec<f64>),
     /// Quantiles of a slot's signal.

@@ -25,8 +25,9 @@ pub enum Purpose {
 pub enum Form {
     /// A weight for each of a few terms, in place of a series with a few shape parameters: three plays for a smooth density.
     Few,
-    /// The series in another arrangement: plays that widen with the rate in place of a lag behind them, powers about the point of operation.
-    Smooth,
+    /// The law in another arrangement: plays that widen with the rate in place of a lag behind them, powers about the point of operation, a loop
+    /// that stiffens where the plain one gives way.
+    Other,
     /// More terms, for recordings that are sharp enough to tell: six plays in place of three, a lag that does not start settled.
     Finer,
     /// More terms, whose places are fitted too: six plays with a spacing of their own.
@@ -42,7 +43,7 @@ impl Purpose {
     pub const FITTED: [Self; 7] = [
         Self::Refit,
         Self::Form(Form::Unsettled),
-        Self::Form(Form::Smooth),
+        Self::Form(Form::Other),
         Self::Form(Form::Few),
         Self::Form(Form::Finer),
         Self::Form(Form::FinerUnsettled),

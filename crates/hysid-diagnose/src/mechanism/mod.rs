@@ -144,6 +144,13 @@ impl Mechanism {
         known
     }
 
+    /// The parameter of the simulation that this law can take the place of: the size of a law of another family, there already, that this one contains.
+    /// Dahl's friction beside a dry friction of the simulation is the same friction twice.
+    pub(crate) fn stands_for<'s>(&self, slot: &'s Slot) -> Option<&'s str> {
+        let contained = self.contains.iter().filter_map(|id| mechanism(id)).filter(|m| m.family != self.family);
+        contained.into_iter().find_map(|m| slot.size_beside(m.already))
+    }
+
     /// What the recording lacks for this mechanism to be seen at the slot, in words; `None` when nothing is lacking.
     pub fn lacking(&self, signals: &Signals) -> Option<String> {
         let missing: Vec<String> = self.needs.iter().filter_map(|need| need.lacking(signals)).collect();

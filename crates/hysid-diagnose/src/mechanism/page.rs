@@ -52,6 +52,7 @@ fn place_name(place: Place) -> &'static str {
         Place::Force => "force on a moving part",
         Place::Connection => "force between two parts",
         Place::ForceLaw => "static force law",
+        Place::Loop => "loop of the simulation",
         Place::Store => "store",
         Place::Sensor => "sensor",
         Place::Parameter => "parameter",
@@ -69,6 +70,9 @@ fn parameters(law: &Law) -> String {
             Role::Shape(grid) | Role::Constant(grid) => match grid {
                 Grid::Values(v) => format!("{} values", v.len()),
                 Grid::Reach(s, v) => format!("{} shares of half the range of {s}", v.len()),
+                Grid::Turns(s, v) => {
+                    format!("{} shares of half the range of {s}, lines of the residual over {s}", v.len())
+                }
                 Grid::Quantiles(s, v) => format!("{} quantiles of the size of {s}", v.len()),
                 Grid::SignedQuantiles(s, v) => format!("{} quantiles of {s}", v.len()),
                 Grid::Times(n) => format!("{n} moments"),

@@ -20,6 +20,8 @@ pub struct Shape {
     pub name: String,
     /// The values to try, in ascending order.
     pub grid: Vec<f64>,
+    /// Those of them to which the residual itself pointed beside those that are tried on any recording.
+    pub pointed: Vec<f64>,
     /// Whether least squares alone cannot move it.
     pub searched: bool,
     /// What of the recording the values were taken from.
@@ -37,6 +39,8 @@ pub enum Places {
     Moments,
     /// Lines of the residual's spectrum.
     Lines,
+    /// Lines of its spectrum over the position.
+    Turns,
 }
 
 impl Places {
@@ -44,6 +48,7 @@ impl Places {
         match grid {
             Grid::Times(_) => Self::Moments,
             Grid::Peaks(_) => Self::Lines,
+            Grid::Turns(..) => Self::Turns,
             _ => Self::Any,
         }
     }

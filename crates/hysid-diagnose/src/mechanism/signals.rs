@@ -36,6 +36,8 @@ pub struct Signals {
     pub band_hz: (f64, f64),
     /// Frequencies of the largest peaks of the residual, if it is known, in Hz.
     pub peaks_hz: Vec<f64>,
+    /// Periods over the displacement to which the residual points, in its unit.
+    pub periods: Vec<f64>,
 }
 
 impl Signals {
@@ -56,6 +58,7 @@ impl Signals {
             step: OnceLock::new(),
             band_hz,
             peaks_hz: Vec::new(),
+            periods: Vec::new(),
         }
     }
 
@@ -142,10 +145,10 @@ impl Signals {
         };
         let mut values = match grid {
             Grid::Values(multiples) => multiples.iter().map(|m| m * size).collect(),
-            Grid::Reach(symbol, shares) => {
+            Grid::Reach(symbol, shares) | Grid::Turns(symbol, shares) => {
                 let reach = self.reach(symbol);
                 let reach = if reach > 0.0 { reach } else { size };
-                shares.iter().map(|s| s * reach).collect()
+                shares.iter().map(|s| s * reach).chain(self.pointed(grid).iter().copied()).collect()
             }
             Grid::Quantiles(symbol, shares) => at(&self.sorted(symbol, f64::abs), shares),
             Grid::SignedQuantiles(symbol, shares) => at(&self.sorted(symbol, |v| v), shares),
@@ -173,6 +176,11 @@ impl Signals {
         values.sort_by(f64::total_cmp);
         values.dedup();
         values
+    }
+
+    /// Values of a grid to which the residual points beside those that are tried on any recording.
+    pub(super) fn pointed(&self, grid: &Grid) -> &[f64] {
+        if matches!(grid, Grid::Turns(..)) { &self.periods } else { &[] }
     }
 
     /// Bounds for a parameter whose law states none.

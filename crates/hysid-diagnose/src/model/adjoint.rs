@@ -11,8 +11,23 @@
 use nalgebra::DMatrix;
 
 use super::Model;
+use crate::evidence::Whitener;
 
 impl Model<'_> {
+    /// The score of a signal added to each input at each instant, for each of several whitened residuals: `[residual][input][stretch][sample]`; `None`
+    /// where [`Self::by_inputs`] has none.
+    pub fn scores(&self, theta: &[f64], noise: &Whitener, residuals: &[Vec<f64>]) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
+        let layout = &self.data.layout;
+        // A filter that does not change with time is transposed by running it backwards; only the start, where it is not settled, differs.
+        let reversed = |x: &[f64]| {
+            let mut out = x.to_vec();
+            layout.series.iter().for_each(|s| out[s.rows.clone()].reverse());
+            out
+        };
+        let weights: Vec<Vec<f64>> = residuals.iter().map(|r| reversed(&noise.apply(layout, &reversed(r)))).collect();
+        self.by_inputs(theta, &weights)
+    }
+
     /// The derivative of `sum v[row] y_hat[row]` by a signal added to each input at each sample, for each of several `v`:
     /// `[v][input][stretch][sample]`; `None` where the run diverges or the equations have no finite linearisation.
     pub fn by_inputs(&self, theta: &[f64], vs: &[Vec<f64>]) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {

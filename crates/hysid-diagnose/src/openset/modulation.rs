@@ -105,15 +105,7 @@ impl<'d> Modulated<'d> {
 
     /// The score of a modulation at each instant, for each of several whitened residuals: `[residual][symbol][stretch][sample]`.
     pub fn scores(&self, noise: &Whitener, residuals: &[Vec<f64>]) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
-        let layout = &self.model.data().layout;
-        // A filter that does not change with time is transposed by running it backwards; only the start, where it is not settled, differs.
-        let reversed = |x: &[f64]| {
-            let mut out = x.to_vec();
-            layout.series.iter().for_each(|s| out[s.rows.clone()].reverse());
-            out
-        };
-        let weights: Vec<Vec<f64>> = residuals.iter().map(|r| reversed(&noise.apply(layout, &reversed(r)))).collect();
-        let all = self.model.by_inputs(&self.theta, &weights)?;
+        let all = self.model.scores(&self.theta, noise, residuals)?;
         let of_places = |mut by: Vec<Vec<Vec<f64>>>| self.places.iter().map(|&i| std::mem::take(&mut by[i])).collect();
         Some(all.into_iter().map(of_places).collect())
     }

@@ -2,7 +2,7 @@
 
 use super::finish::finish;
 use super::screen::{Candidate, rewrite_at, with_added_starts};
-use super::starts::{set, starts};
+use super::starts::{set, starts, weakened};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Purpose};
 use crate::model::Values;
@@ -27,6 +27,9 @@ impl Part {
     pub fn of_candidate(candidate: &Candidate, point: usize, amplitudes: &[(String, f64)]) -> Self {
         let start = starts(candidate).into_iter().next().unwrap_or_default();
         let shapes = candidate.points.get(point).map_or(&[][..], |p| &p.shapes);
+        // A pair tells how strong each of its members is.
+        let weaker = amplitudes.first().and_then(|(_, weight)| weakened(candidate, shapes, *weight));
+        let shapes = weaker.as_deref().unwrap_or(shapes);
         let find = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
         let values = candidate.refit.parameters_of();
         Self {

@@ -3,91 +3,14 @@
 use rayon::prelude::*;
 
 use super::assemble::{Part, assemble, complete, without};
-use super::finer::finer;
+use super::finer::{finer, inherited};
 use super::fitting::{HOPELESS, refit_all};
 use super::joint::pairs;
+use super::parted::parted;
+use super::rivals::{include, rivals_of, short_list};
 use super::screen::Candidate;
 use crate::budget::Step;
-use crate::mechanism::Mechanism;
-use crate::model::hypothesis::{Effect, Hypothesis, Key, Setting};
-
-/// The candidates worth a refit: the best by score, at most `most`, one for each slot and family that is not far behind, and what the recording shows
-/// by itself.
-pub fn short_list(candidates: &[Candidate], most: usize) -> Vec<&Candidate> {
-    let Some(top) = candidates.first().map(Candidate::score) else { return Vec::new() };
-    let mut list: Vec<&Candidate> = Vec::new();
-    for (i, c) in candidates.iter().enumerate() {
-        let fresh = !list.iter().any(|l| l.mechanism.family == c.mechanism.family && l.slot.label == c.slot.label);
-        let near = c.score() > top - 40.0 && c.score() > 0.0;
-        if i < most || (fresh && near && list.len() < most + 6) {
-            list.push(c);
-        }
-    }
-    // Siblings of the best must be heard: the verdict turns on them.
-    if let Some(best) = candidates.first() {
-        for c in candidates {
-            if rivals(best.mechanism, c.mechanism) && c.slot.label == best.slot.label {
-                include(&mut list, c);
-            }
-        }
-    }
-    candidates.iter().filter(|c| c.is_shown()).for_each(|c| include(&mut list, c));
-    list
-}
-
-/// Adds a candidate that is not in the list yet.
-fn include<'c>(list: &mut Vec<&'c Candidate>, c: &'c Candidate) {
-    if !list.iter().any(|l| std::ptr::eq(*l, c)) {
-        list.push(c);
-    }
-}
-
-/// Whether two mechanisms are easily taken for each other.
-fn rivals(a: &Mechanism, b: &Mechanism) -> bool {
-    let names = |a: &Mechanism, b: &Mechanism| a.contains.contains(&b.id) || a.confusable.contains(&b.id);
-    a.family == b.family || a.family.twin() == Some(b.family) || names(a, b) || names(b, a)
-}
-
-/// Rivals that are heard at other slots than that of the effect whose rivals they are.
-const ELSEWHERE: usize = 3;
-/// Rivals that are fitted to the end after the best single effect is known.
-const SECOND_HEARING: usize = 4;
-
-/// The candidates that are easily taken for an effect: all at its slot, the best few at others.
-fn rivals_of<'c>(effect: &Effect, candidates: &'c [Candidate]) -> Vec<&'c Candidate> {
-    let (here, elsewhere): (Vec<&Candidate>, Vec<&Candidate>) = candidates
-        .iter()
-        .filter(|c| rivals(effect.mechanism, c.mechanism))
-        .partition(|c| c.slot.label == effect.slot.label);
-    here.into_iter().chain(elsewhere.into_iter().take(ELSEWHERE)).collect()
-}
-
-/// What is easily taken for the best single effect of a pool and was not fitted yet, or given up after a few iterations.
-///
-/// `given` are statements that were heard to the end.
-pub fn unheard<'c>(pool: &[Hypothesis<'_>], candidates: &'c [Candidate], given: &[Key]) -> Vec<&'c Candidate> {
-    let Some(best) = best_of_size(pool, 1).map(|i| &pool[i]) else { return Vec::new() };
-    let heard = |c: &&Candidate| {
-        let key = c.key();
-        given.contains(&key) || pool.iter().any(|h| h.key() == key && h.log_evidence > best.log_evidence - HOPELESS)
-    };
-    rivals_of(&best.effects[0], candidates).into_iter().filter(|c| !heard(c)).take(SECOND_HEARING).collect()
-}
-
-/// Candidates whose law contains that of the best single effect of a pool, at its slot, and which do not follow the recording as well although
-/// they can: their fit came to rest somewhere else, or was given up. With them that effect, by its place in the pool.
-pub fn outdone_by_a_special_case<'c>(
-    pool: &[Hypothesis<'_>],
-    candidates: &'c [Candidate],
-) -> Option<(usize, Vec<&'c Candidate>)> {
-    let best = best_of_size(pool, 1)?;
-    let (special, reached) = (&pool[best].effects[0], pool[best].base.log_likelihood);
-    let follows = |c: &Candidate| pool.iter().any(|h| h.key() == c.key() && h.base.log_likelihood >= reached - 1e-3);
-    let wider = candidates.iter().filter(|c| {
-        c.mechanism.contains.contains(&special.mechanism.id) && c.slot.label == special.slot.label && !follows(c)
-    });
-    Some((best, wider.collect()))
-}
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
 /// How a search is bounded.
 #[derive(Debug, Clone, Copy)]
@@ -152,6 +75,20 @@ pub fn superposed<'d>(
     out
 }
 
+/// Candidates that are fitted where the test sees nothing more, and the score from which on they are.
+const UNSEEN: (usize, f64) = (3, 16.0);
+
+/// A set with one more effect where no test sees anything more: surrogates of what is left carry the effect itself. One that was found among so many
+/// by looking at the residual must pay for their number.
+fn unseen<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, candidates: &[Candidate]) -> Vec<Hypothesis<'d>> {
+    let likely = candidates.iter().filter(|c| c.score() > UNSEEN.1 && !c.mechanism.family.is_slow_noise());
+    let list: Vec<&Candidate> = likely.take(UNSEEN.0).collect();
+    let least = parent.log_evidence + LEAST_GAIN + (candidates.len().max(1) as f64).ln();
+    let mut found = refit_all(setting, parent, &list);
+    found.retain(|h| h.log_evidence > least);
+    found
+}
+
 /// Extends the hypotheses of `pool` (all of one effect or more) until evidence stops growing, prunes the best and tries swaps.
 ///
 /// `candidates` are those of the simulation without effects. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
@@ -174,9 +111,12 @@ pub fn compose<'d>(
         let more = unexplained(&pool[standing]);
         let best = pool[standing].log_evidence;
         let parents = beam(pool, depth - 1, options.beam);
-        let mut found = Vec::new();
+        let mut found = if depth == 2 { parted(setting, none, pool, candidates) } else { Vec::new() };
         if more && depth == 2 {
             found.extend(superposed(setting, none, candidates, options.most));
+        }
+        if !more {
+            found.extend(unseen(setting, &pool[standing], &around(&pool[standing])));
         }
         for p in parents {
             if enough() {
@@ -284,7 +224,17 @@ fn swapped<'d>(
         let amplitudes = rival.points.first().map_or(&[][..], |p| &p.amplitudes);
         let mut parts: Vec<Part> = set.effects.iter().map(|e| Part::of_effect(e, &values)).collect();
         parts[index] = Part::of_candidate(rival, 0, amplitudes);
-        let h = assemble(setting, none, &values, &parts, &set.base.whitener, 5)?;
+        let begun = |parts: &[Part]| assemble(setting, none, &values, parts, &set.base.whitener, 5);
+        let own = begun(&parts);
+        // A relative begins where the member stands, too.
+        let member = &set.effects[index];
+        let inheriting = rival.mechanism.family == member.mechanism.family && rival.slot.label == member.slot.label;
+        let heir = inheriting.then(|| {
+            let law = rival.mechanism.law_at(&rival.slot, rival.refit.purpose);
+            parts[index].values = inherited(&law, &parts[index].values, member, &values);
+            begun(&parts)
+        });
+        let h = own.into_iter().chain(heir.flatten()).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
         let near = h.log_evidence > set.log_evidence - HOPELESS;
         Some(if near { complete(setting, h) } else { h })
     });
@@ -345,7 +295,7 @@ pub fn best_of(pool: &[Hypothesis<'_>]) -> Option<usize> {
 }
 
 /// The set of so many effects with the most evidence.
-fn best_of_size(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
+pub fn best_of_size(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
     (0..pool.len())
         .filter(|&i| pool[i].effects.len() == effects)
         .max_by(|&a, &b| pool[a].log_evidence.total_cmp(&pool[b].log_evidence))

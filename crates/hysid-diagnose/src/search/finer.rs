@@ -113,6 +113,18 @@ fn written_as<'d>(
     Some(best)
 }
 
+/// Start values for a law in the place of an effect, in the order of the law: what both name alike as the effect has it, further amplitudes at zero,
+/// further shapes as in `own`, values in the same order. A friction that turns out to be unequal begins at the size that it has as an equal one.
+pub fn inherited(law: &Law, own: &[Option<f64>], effect: &Effect, values: &Values) -> Vec<Option<f64>> {
+    let present = effect.mechanism.law_at(&effect.slot, effect.written.purpose);
+    let (amplitudes, shapes) = named(&present, effect, values);
+    let names = Names::of(law);
+    let alike = |list: &[Named], name: &String| list.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
+    let further = own.iter().skip(names.amplitudes.len());
+    let first = names.amplitudes.iter().map(|name| Some(alike(&amplitudes, name).unwrap_or(0.0)));
+    first.chain(names.shapes.iter().zip(further).map(|(name, own)| alike(&shapes, name).or(*own))).collect()
+}
+
 /// The names that a law has for what is fitted.
 struct Names {
     amplitudes: Vec<String>,
@@ -172,6 +184,27 @@ mod tests {
         check(&near, false, 1);
         check(&[(300.0, 315.0), (345.8, 357.0), (341.0, 371.0)], true, 1);
         check(&[(8.0, 15.0), (7.9, 15.5)], false, 0);
+    }
+
+    #[test]
+    fn a_law_in_the_place_of_another_begins_where_that_stands() {
+        use crate::mechanism::conformance::{example_signals, specimens};
+        use crate::mechanism::{Purpose, mechanism};
+        use crate::slot::Structure;
+
+        let simulation = specimens().swap_remove(0);
+        let coulomb = mechanism("coulomb_friction").unwrap();
+        let slot = coulomb.slots(&Structure::of(&simulation)).remove(0);
+        let signals = example_signals(&simulation, &slot);
+        let written = coulomb.rewrite(&simulation, &slot, &signals, Purpose::Refit).unwrap();
+        let mut values = Values::default();
+        values.parameters.insert(written.amplitudes[0].name.clone(), 3.5);
+        let effect = Effect { mechanism: coulomb, slot: slot.clone(), written, concealment: None };
+        let begun = |id: &str, own: &[Option<f64>]| {
+            inherited(&mechanism(id).unwrap().law_at(&slot, Purpose::Refit), own, &effect, &values)
+        };
+        assert_eq!(begun("asymmetric_friction", &[Some(9.0), Some(8.0)]), [Some(3.5), Some(0.0)]);
+        assert_eq!(begun("stribeck_friction", &[Some(9.0), Some(8.0), Some(0.2)]), [Some(3.5), Some(0.0), Some(0.2)]);
     }
 
     #[test]

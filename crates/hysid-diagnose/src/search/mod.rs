@@ -13,9 +13,12 @@ pub mod finish;
 pub mod fitting;
 pub mod joint;
 pub mod numerics_check;
+pub mod parted;
 pub mod peaks;
 pub mod profile;
 pub mod rehearsal;
+pub mod ripple;
+pub mod rivals;
 pub mod screen;
 pub mod second_look;
 pub mod starts;
@@ -33,8 +36,9 @@ use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::openset::{ODDS_AGAINST_MORE, OpenSet, correction};
 use crate::request::{Hooks, Options, Question};
 use crate::slot::Slot;
-use compose::{Ask, SearchOptions, add, compose, outdone_by_a_special_case, short_list, unheard};
+use compose::{Ask, SearchOptions, add, compose};
 use fitting::{refit, refit_all, refit_wider};
+use rivals::{outdone_by_a_special_case, short_list, unheard};
 use screen::{Candidate, screen};
 
 /// Composition goes on while the mismatch that remains is significant at this level.
@@ -137,12 +141,11 @@ impl<'a, 'd> Search<'a, 'd> {
                 add(pool, h);
             }
         }
-        if let Some((special, wider)) = outdone_by_a_special_case(pool, candidates)
-            && !self.setting.budget.omits(Step::Rivals)
-        {
+        let outdone = outdone_by_a_special_case(pool, candidates);
+        if !outdone.is_empty() && !self.setting.budget.omits(Step::Rivals) {
             let setting = &self.setting;
-            let found: Vec<Hypothesis<'d>> =
-                wider.par_iter().filter_map(|c| refit_wider(setting, none, c, &pool[special])).collect();
+            let wider = outdone.par_iter().filter_map(|(i, c)| refit_wider(setting, none, c, &pool[*i]));
+            let found: Vec<Hypothesis<'d>> = wider.collect();
             found.into_iter().for_each(|h| add(pool, h));
         }
         if !self.setting.budget.omits(Step::Numerics)
@@ -230,7 +233,7 @@ impl<'a, 'd> Search<'a, 'd> {
         }
     }
 
-    /// Offsets, drifts and lines that plain squares see around a hypothesis: a noise that rises towards low frequency holds the ones, an autoregression
+    /// Offsets, drifts, ripples and lines that plain squares see around a hypothesis: a noise that rises towards low frequency holds the ones, an autoregression
     /// predicts the others, and under it their scores are nothing. Fitted beside the effects, each with a noise model of its own, the evidence tells
     /// which it is.
     fn absorbed(&self, h: &Hypothesis<'d>) -> Vec<Candidate> {
@@ -239,7 +242,8 @@ impl<'a, 'd> Search<'a, 'd> {
         }
         let plain = Setting { noise: NoiseKind::White(1.0), ..self.setting.clone() };
         let Some(base) = plain.further(&h.base, None, 1, PLAIN_ITERATIONS) else { return Vec::new() };
-        let like_noise = |m: &Mechanism, _: &Slot| m.family.is_slow_noise() || m.family == Family::ExternalDisturbance;
+        let lines = [Family::ExternalDisturbance, Family::PositionRipple];
+        let like_noise = |m: &Mechanism, _: &Slot| m.family.is_slow_noise() || lines.contains(&m.family);
         let mut found = screen(&base, &self.setting.original, &h.effects, &base.evidence(), &like_noise);
         found.retain(|c| c.score() > STOP_SCORE);
         found.truncate(MOST_ABSORBED);

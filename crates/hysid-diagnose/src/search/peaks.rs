@@ -72,7 +72,14 @@ fn cycle(y: &[f64]) -> Option<f64> {
 
 /// Lines of a recording's spectrum among which the residual itself pointed to one, for each of an effect's shapes that is such a line.
 pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
-    let lines = |shape: &Shape| if shape.places == Places::Lines { (0.5 * data.rows() as f64).max(1.0) } else { 1.0 };
+    let lines = |shape: &Shape| match shape.places {
+        Places::Lines => (0.5 * data.rows() as f64).max(1.0),
+        // As many as the longest period of the grid holds of the shortest.
+        Places::Turns => {
+            shape.grid.first().zip(shape.grid.last()).map_or(1.0, |(low, high)| (2.0 * high / low).max(1.0))
+        }
+        Places::Any | Places::Moments => 1.0,
+    };
     effect.shapes.iter().map(lines).product()
 }
 

@@ -6,6 +6,7 @@ use super::screen::{Candidate, Point, with_added_starts};
 use crate::budget::Step;
 use crate::calibration::global::calibrated_copy;
 use crate::calibration::unfold::calibrated_unfolded;
+use crate::mechanism::mechanism;
 use crate::model::Values;
 use crate::model::hypothesis::{Hypothesis, Setting};
 
@@ -34,19 +35,63 @@ pub fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
             out.push(named(p));
         }
     }
-    if let [_, .., last] = candidate.refit.amplitudes.as_slice() {
-        // Beside another the last amplitude may have the wrong sign at zero, where friction that sticks is nothing like its derivative.
+    let beside_its_own =
+        candidate.mechanism.contains.iter().any(|id| mechanism(id).is_some_and(|m| m.is_in(&candidate.slot)));
+    let amplitudes = candidate.refit.amplitudes.as_slice();
+    if let Some(last) = amplitudes.last().filter(|_| amplitudes.len() > 1 || beside_its_own) {
+        // Beside another, or beside one that the simulation has, the last amplitude may have the wrong sign at zero, where friction that sticks is
+        // nothing like its derivative.
         let mut turned = named(best);
         turned.iter_mut().filter(|(name, _)| *name == last.name).for_each(|(_, value)| *value = -*value);
         out.push(turned);
     }
-    if candidate.refit.amplitudes.is_empty() && !candidate.refit.neutral.is_empty() {
-        // Only shapes: the effect's strength is in them, and the point's weight says how strong.
-        let weight = best.amplitudes.first().map_or(1.0, |a| a.1.clamp(0.05, 1.0));
-        let neutral = |name: &str| candidate.refit.neutral.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
-        out.push(best.shapes.iter().map(|(n, v)| (n.clone(), neutral(n) + weight.sqrt() * (v - neutral(n)))).collect());
-    }
+    let weight = best.amplitudes.first().map_or(1.0, |a| a.1);
+    out.extend(
+        [weight.clamp(0.05, 1.0).sqrt(), weight].into_iter().filter_map(|w| weakened(candidate, &best.shapes, w)),
+    );
     out
+}
+
+/// Least share of a shape's way from its neutral value that a weak effect begins at.
+const WEAKEST: f64 = 0.01;
+
+/// Shapes of a law that has no amplitude, so that its strength is in them, at a share of their way from where the law does nothing; `None` for other
+/// laws.
+pub fn weakened(candidate: &Candidate, shapes: &[(String, f64)], share: f64) -> Option<Vec<(String, f64)>> {
+    let neutral = &candidate.refit.neutral;
+    if !candidate.refit.amplitudes.is_empty() || neutral.is_empty() {
+        return None;
+    }
+    let neutral = |name: &str| neutral.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
+    let share = share.clamp(WEAKEST, 1.0);
+    Some(shapes.iter().map(|(n, v)| (n.clone(), neutral(n) + share * (v - neutral(n)))).collect())
+}
+
+/// The values with the candidate in the place of what the simulation has of the same: its first amplitude takes the size, at the point that explains
+/// most and at the shortest shape of the grid, which at amplitude zero beside the other looks like nothing.
+fn in_place(candidate: &Candidate, values: &Values) -> Vec<Values> {
+    let document = &candidate.refit.simulation;
+    let (Some(own), Some(amplitude)) =
+        (candidate.mechanism.stands_for(&candidate.slot), candidate.refit.amplitudes.first())
+    else {
+        return Vec::new();
+    };
+    let (Some(size), true) = (values.parameters.get(own).copied(), document.parameter(own).is_some_and(|p| !p.fixed))
+    else {
+        return Vec::new();
+    };
+    let Some(best) = candidate.points.first() else { return Vec::new() };
+    let shortest = |name: &str| candidate.refit.shapes.iter().find(|s| s.name == name).and_then(|s| s.grid.first());
+    let least: Vec<(String, f64)> =
+        best.shapes.iter().map(|(n, v)| (n.clone(), shortest(n).copied().unwrap_or(*v))).collect();
+    let begun = |shapes: &[(String, f64)]| {
+        let mut from = values.clone();
+        shapes.iter().for_each(|(name, x)| set(&mut from, document, name, *x));
+        set(&mut from, document, own, 0.0);
+        set(&mut from, document, &amplitude.name, size);
+        from
+    };
+    if least == best.shapes { vec![begun(&least)] } else { vec![begun(&best.shapes), begun(&least)] }
 }
 
 /// Sets a start value of a parameter that the document has, within its bounds.
@@ -69,6 +114,7 @@ pub fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate
     };
     let starts = starts(candidate);
     let mut out: Vec<Values> = starts.iter().map(|s| with(&values, s.clone())).collect();
+    out.extend(in_place(candidate, &values));
     if parent.effects.is_empty()
         && let Some(best) = starts.into_iter().next()
     {

@@ -219,6 +219,7 @@ impl Finder<'_> {
             slot.offer(self.simulation, "c", whole(c));
         }
         slot.context = vec![one.derivative.clone()];
+        slot.offer_own_sign(self.simulation);
         slot
     }
 }
@@ -230,6 +231,17 @@ pub(super) mod tests {
 
     /// Displacement, velocity and stiffness of the slots of a kind, with the states that they pull at.
     pub fn slots(place: Place, states: &[(&str, &str, &str)]) -> Vec<[String; 4]> {
+        let told = |slot: &Slot| {
+            let of = |symbol: &str| slot.quantity(symbol).map_or(String::new(), |q| q.expression.to_string());
+            let Target::Derivatives(pulls) = &slot.target else { panic!("{}", slot.label) };
+            let pull = |p: &Pull| format!("{}{}", if p.sign > 0.0 { "-" } else { "+" }, p.of(&Expr::symbol(&p.state)));
+            [of("x"), of("v"), of("k"), pulls.iter().map(pull).collect::<Vec<_>>().join(" ")]
+        };
+        slots_of(place, states).iter().map(told).collect()
+    }
+
+    /// The slots of a kind, of a simulation with these states (name, derivative, unit).
+    pub fn slots_of(place: Place, states: &[(&str, &str, &str)]) -> Vec<Slot> {
         let states: String = states
             .iter()
             .map(|(name, derivative, unit)| {
@@ -241,13 +253,7 @@ pub(super) mod tests {
              c = {{ value = 0.3, min = 0.0 }}\nn = {{ value = 4.0, fixed = true }}\n[states]\n{states}[outputs]\nspeed_rad_s = \"w2\"\n"
         );
         let simulation = Simulation::parse(&text, "test.sim.toml").unwrap();
-        let told = |slot: &Slot| {
-            let of = |symbol: &str| slot.quantity(symbol).map_or(String::new(), |q| q.expression.to_string());
-            let Target::Derivatives(pulls) = &slot.target else { panic!("{}", slot.label) };
-            let pull = |p: &Pull| format!("{}{}", if p.sign > 0.0 { "-" } else { "+" }, p.of(&Expr::symbol(&p.state)));
-            [of("x"), of("v"), of("k"), pulls.iter().map(pull).collect::<Vec<_>>().join(" ")]
-        };
-        Structure::of(&simulation).slots.iter().filter(|s| s.place == place).map(told).collect()
+        Structure::of(&simulation).slots.into_iter().filter(|s| s.place == place).collect()
     }
 
     #[test]

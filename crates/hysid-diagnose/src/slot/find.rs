@@ -28,6 +28,7 @@ impl Structure {
         slots.extend(finder.forces());
         slots.extend(finder.connections());
         slots.extend(finder.force_laws());
+        slots.extend(finder.own_loops());
         slots.extend(finder.stores());
         slots.extend(finder.sensors());
         slots.extend(finder.parameters());
@@ -87,7 +88,7 @@ impl Finder<'_> {
     }
 
     /// Whether a state is the displacement or the velocity of a part.
-    fn moves(&self, name: &str) -> bool {
+    pub(super) fn moves(&self, name: &str) -> bool {
         self.motions.iter().any(|m| m.v == name || m.x == Some(name))
     }
 
@@ -237,6 +238,17 @@ impl Finder<'_> {
         }
     }
 
+    /// The current that a parameter resists, as `R` in `(u - R*i)/L`.
+    fn current_through(&self, parameter: &str) -> Option<&str> {
+        let resists = |s: &&State| {
+            let (voltage, inductance) = force_of(self.simulation, &s.derivative);
+            self.simulation.unit_of(&s.name).is_some_and(|u| is_one_of(&u, &["A"]))
+                && linear_coefficient(self.simulation, voltage, &s.name).is_some_and(|c| c.uses(parameter))
+                && !inductance.is_some_and(|l| l.uses(parameter))
+        };
+        self.simulation.states.iter().find(resists).map(|s| s.name.as_str())
+    }
+
     /// The current of a winding that an input drives, and the motion that it moves; `None` where the winding feels the speed already.
     fn winding(&self, input: &str) -> Option<(&str, &Motion<'_>)> {
         let current = |s: &&State| self.simulation.unit_of(&s.name).is_none_or(|u| is_one_of(&u, &["A"]));
@@ -334,6 +346,9 @@ impl Finder<'_> {
                         slot.offer(self.simulation, symbol, q.expression.clone());
                     }
                 }
+            } else if let Some(current) = self.current_through(name) {
+                // What a resistance makes of a current is what a damper makes of a velocity.
+                slot.offer(self.simulation, "v", Expr::symbol(current));
             }
             slot.context = self.equations();
             slots.push(slot);

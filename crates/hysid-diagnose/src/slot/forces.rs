@@ -71,6 +71,7 @@ impl Finder<'_> {
         }
         self.offer_force(&mut slot, motion.derivative, motion.x, motion.v, motion.scale.as_ref());
         slot.context = vec![motion.derivative.clone()];
+        slot.offer_own_sign(self.simulation);
         slot
     }
 
@@ -135,6 +136,7 @@ impl Finder<'_> {
                 slot.offer(self.simulation, "F", output.expression.clone());
                 self.name_unit(&mut slot, "F", &output.column);
                 slot.context = self.equations();
+                slot.offer_own_sign(self.simulation);
                 slot.constant = has_free_constant(self.simulation, &output.expression);
                 slots.push(slot);
             }

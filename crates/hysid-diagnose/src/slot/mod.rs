@@ -15,6 +15,7 @@ mod algebra;
 mod connections;
 mod find;
 mod forces;
+mod loops;
 mod motion;
 mod pattern;
 mod sensed;
@@ -28,6 +29,9 @@ pub use find::Structure;
 
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
+
+/// Smoothed signs of a velocity that a simulation may have in the place of the sharp one.
+const SMOOTH_SIGNS: [&str; 4] = ["tanh(v/P)", "tanh(P*v)", "v/(abs(v) + P)", "v/sqrt(v^2 + P)"];
 
 /// The symbol for the velocity as the simulation has it, where that is not the rate of the displacement.
 pub(crate) const OWN_VELOCITY: &str = "v_own";
@@ -45,6 +49,8 @@ pub enum Place {
     Connection,
     /// The output of a static relation, as a force law.
     ForceLaw,
+    /// The rate of a hysteresis loop that the simulation has.
+    Loop,
     /// A first-order state that holds something.
     Store,
     /// The measured output, as a sensor.
@@ -229,6 +235,23 @@ impl Slot {
             form.is_some_and(|form| self.context.iter().any(|e| pattern::occurs(&form, e)))
         };
         shown("v") || (self.has(OWN_VELOCITY) && shown(OWN_VELOCITY))
+    }
+
+    /// Offers the sign of the velocity as the equations here smooth it, where they do: friction that sticks beside one that creeps is another machine.
+    fn offer_own_sign(&mut self, simulation: &Simulation) {
+        let symbol = |s: &str| self.symbols.get(s).map(|q| q.expression.clone());
+        let forms: Vec<Expr> = SMOOTH_SIGNS.iter().filter_map(|form| pattern::prepare(form, symbol)).collect();
+        let sign = forms.iter().find_map(|form| self.context.iter().find_map(|e| pattern::part(form, e)));
+        if let Some(sign) = sign {
+            self.offer(simulation, "own_sign", sign);
+        }
+    }
+
+    /// The symbol that multiplies, alone, something of one of these forms in the equations here.
+    pub(crate) fn size_beside(&self, forms: &[&str]) -> Option<&str> {
+        let symbol = |s: &str| self.symbols.get(s).map(|q| q.expression.clone());
+        let prepared = forms.iter().filter_map(|form| pattern::prepare(form, symbol));
+        prepared.into_iter().find_map(|form| self.context.iter().find_map(|e| pattern::size_of(&form, e)))
     }
 
     /// Whether the displacement's rate is the velocity, but for a number: what depends on it is then an energy over the same coordinate.

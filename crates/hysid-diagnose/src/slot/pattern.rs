@@ -45,6 +45,31 @@ pub(super) fn occurs(form: &Expr, expr: &Expr) -> bool {
     found
 }
 
+/// The first part of `expr` that has this form.
+pub(super) fn part(form: &Expr, expr: &Expr) -> Option<Expr> {
+    let mut found = None;
+    expr.visit(&mut |e| {
+        if found.is_none() && matches(form, e) {
+            found = Some(e.clone());
+        }
+    });
+    found
+}
+
+/// The symbol that is the only other factor of a product which `expr` holds of something of this form: `F` of `F*sign(v)`.
+pub(super) fn size_of<'e>(form: &Expr, expr: &'e Expr) -> Option<&'e str> {
+    let mut found = None;
+    expr.visit(&mut |e| {
+        if let Expr::Binary(BinaryOp::Mul, ..) = e {
+            let (of_form, others): (Vec<&Expr>, Vec<&Expr>) = factors(e).into_iter().partition(|f| matches(form, f));
+            if let ([_], [Expr::Symbol(size)]) = (&of_form[..], &others[..]) {
+                found.get_or_insert(size.as_str());
+            }
+        }
+    });
+    found
+}
+
 /// The smooth step in this symbol, `1/(1 + exp(Z))`, that `expr` holds first, also where something else stands above its line; it holds no memory.
 pub(super) fn step_in(expr: &Expr, symbol: &str) -> Option<Expr> {
     let form = prepare("1 + exp(Z)", |_| None)?;
@@ -120,5 +145,18 @@ mod tests {
         check("v*abs(v)", "u - c*abs(v)*v", true);
         check("abs(v)*Z", "v - abs(v)*z/g", true);
         check("abs(v)*Z", "v - abs(v)", false);
+    }
+
+    #[test]
+    fn the_size_of_a_force_is_what_multiplies_it_alone() {
+        let check = |text: &str, expected: Option<&str>| {
+            let form = prepare("sign(v)", |s| (s == "v").then(|| Expr::symbol("v"))).unwrap();
+            assert_eq!(size_of(&form, &Expr::parse(text).unwrap()), expected, "{text}");
+        };
+        check("(u - c*v - F*sign(v))/m", Some("F"));
+        check("(u - sign(v)*F)/m", Some("F"));
+        check("u - mu*N*sign(v)", None);
+        check("u - c*v", None);
+        check("u - sign(v)", None);
     }
 }

@@ -44,7 +44,13 @@ pub fn firmness(
         // A fractional element is a relaxation and a mode within the band that was excited.
         let of_a_spectrum =
             own.extends_a_spectrum() && best.effects.iter().any(|o| o.mechanism.family == Family::LinearMemory);
-        let vague = own.stands_for_others() || of_a_spectrum || stretched(&best.base, e) || has_twin(pool, winner, i);
+        let of_turned_noise =
+            own.adds_what_noise_does() && best.effects.iter().any(|o| o.mechanism.id == "rectified_output");
+        let vague = own.stands_for_others()
+            || of_turned_noise
+            || of_a_spectrum
+            || stretched(&best.base, e)
+            || has_twin(pool, winner, i);
         if doubtful || twice || vague {
             s.weaken();
         }

@@ -11,6 +11,7 @@ mod remaining;
 pub(crate) mod trifles;
 mod wanders;
 pub(crate) mod weigh;
+mod wordings;
 
 use crate::file::VerdictKind;
 

@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
+use super::wordings::{collapses, shared, wordings};
 use super::{Claim, FIRM, Hypothesis as Weighed, probabilities};
 use crate::budget::Step;
-use crate::evidence::{difference, norm2};
+use crate::evidence::difference;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting, block_score};
 use crate::search::compose::best_of;
@@ -19,7 +20,7 @@ pub const IMPERFECT_WEIGHT: f64 = 0.2;
 /// Weight of the evidence between members of one family: two laws of one kind differ by how they are written as much as by what they say.
 const SIBLING_WEIGHT: f64 = 0.25;
 /// Log likelihood below which a law that contains another has gained nothing on it, and the weight of the evidence between the two.
-const NESTED_GAIN: f64 = 2.0;
+pub const NESTED_GAIN: f64 = 2.0;
 const NESTED_WEIGHT: f64 = 0.9;
 /// Log evidence that a further effect must bring before it counts.
 const PRICE_OF_AN_EFFECT: f64 = 4.0;
@@ -192,34 +193,6 @@ fn siblings(a: &Hypothesis<'_>, b: &Hypothesis<'_>) -> bool {
     kinds(a) == kinds(b)
 }
 
-/// Squared difference of two predictions, in units of the noise, and difference of their log evidence, below which no recording of this length
-/// tells them apart.
-const SAME: f64 = 1.0;
-/// Log evidence by which a set may trail and its other wordings still matter.
-const NEAR: f64 = 12.0;
-
-/// How many sets say in other words what each one says: as many effects of the same families, and the same prediction. An offset of the input and
-/// one of the sensor of a linear plant are one statement; told twice, they would count twice against another family.
-fn wordings(pool: &[Hypothesis<'_>], winner: usize) -> Vec<usize> {
-    let best = &pool[winner];
-    let families: Vec<Vec<&str>> = pool.iter().map(Hypothesis::families).collect();
-    let layout = &best.base.model.data().layout;
-    let same = |a: &Hypothesis<'_>, b: &Hypothesis<'_>| {
-        let difference: Vec<f64> = a.base.fit.residual.iter().zip(&b.base.fit.residual).map(|(a, b)| a - b).collect();
-        norm2(&best.base.whitener.apply(layout, &difference)) < SAME
-    };
-    (0..pool.len())
-        .map(|i| {
-            let near = |j: usize| (pool[i].log_evidence - pool[j].log_evidence).abs() < SAME;
-            if pool[i].log_evidence < best.log_evidence - NEAR {
-                return 1;
-            }
-            let others = (0..pool.len()).filter(|&j| j != i && families[j] == families[i] && near(j));
-            1 + others.filter(|&j| same(&pool[i], &pool[j])).count()
-        })
-        .collect()
-}
-
 /// How much of the price of its further parameters a set pays too much that contains another as a special case.
 ///
 /// Half of `ln n` is right for a parameter that the recording settles as well as one of its samples times the number of samples. A power that
@@ -267,8 +240,7 @@ pub fn log_weights(
     let best_block = blocks[winner].as_ref().map(|b| b.0);
     let best = &pool[winner];
     let wordings = wordings(pool, winner);
-    pool.iter()
-        .enumerate()
+    let logs: Vec<f64> = (pool.iter().enumerate())
         .map(|(i, h)| {
             let sibling = i != winner && siblings(h, best);
             let contains = i != winner
@@ -292,19 +264,14 @@ pub fn log_weights(
             }
             log - (wordings[i] as f64).ln()
         })
-        .collect()
+        .collect();
+    shared(logs, &collapses(pool))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::budget::Budget;
-    use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::{calibrated, recorded};
-    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
-    use crate::search::fitting::refit;
-    use crate::search::screen::screen;
-    use hysid_plant::Simulation;
+    use crate::oscillator::normal;
 
     #[test]
     fn blocks_veto_what_they_refute_and_not_what_they_do_not_show() {
@@ -332,35 +299,5 @@ mod tests {
         // A set of more effects says the same of the families that it shares.
         let pairs = [set(&[pinching, delay.clone()]), set(&[delay.clone(), dahl.clone()]), set(&[dahl, delay])];
         assert_eq!(likeliest_families(&[0, 1, 2], 0, &pairs, &[0.4, 0.3, 0.3]), ["presliding", "signal_path_lag"]);
-    }
-
-    /// A small offset of a sensor and one of the input leave the same; a spring that bends says something else.
-    #[test]
-    fn an_offset_of_input_and_sensor_are_one_statement() {
-        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
-        let mut random = normal(3);
-        let u = drive(800, &mut random);
-        let mut y = respond(&u, REAL, |_, _| 0.0);
-        let noise = 0.02 * rms(&y);
-        y.iter_mut().for_each(|y| *y += noise * (random() + 0.1));
-        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
-        let budget = Budget::new(&|_| false);
-        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
-        let wanted = ["input_offset", "output_offset", "cubic_stiffness"];
-        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| wanted.contains(&m.id));
-        let fitted = |id: &str| refit(&setting, &none, found.iter().find(|c| c.mechanism.id == id).unwrap()).unwrap();
-        let mut pool: Vec<Hypothesis<'_>> = wanted.into_iter().map(fitted).collect();
-        pool.push(none);
-        assert_eq!(wordings(&pool, 0), [2, 2, 1, 1]);
-        // Together they weigh what one alone does.
-        let weigh_all = |pool: &[Hypothesis<'_>]| {
-            let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
-            log_weights(pool, &weighed, &vec![None; pool.len()], 0, 0.4)
-        };
-        let both = weigh_all(&pool);
-        pool.remove(1);
-        let alone = weigh_all(&pool);
-        let sum = both[0] + (both[1] - both[0]).exp().ln_1p();
-        assert!((sum - alone[0]).abs() < 0.2, "{both:?} {alone:?}");
     }
 }

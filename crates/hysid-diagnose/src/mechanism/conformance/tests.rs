@@ -238,3 +238,78 @@ fn the_period_of_the_motion_is_the_least_time_constant_of_heat() {
     }
     assert!(seen > 0);
 }
+
+/// The power that heats follows the square of the motion, or its size where the force has a size of its own; a current heats what resists it.
+#[test]
+fn heat_follows_the_power_that_is_dissipated() {
+    let text = "[time]\nperiod_s = 0.001\n[inputs]\nu = \"u_V\"\n[parameters]\nR = { value = 2.0, min = 0.1, unit = \"Ohm\" }\n\
+                L = { value = 0.1, min = 0.01, unit = \"H\" }\n[states]\ni = { derivative = \"(u - R*i)/L\", initial = 0.0, unit = \"A\" }\n\
+                [outputs]\ni_A = \"i\"\n";
+    let simulation = Simulation::parse(text, "winding.sim.toml").unwrap();
+    let heating = crate::mechanism::mechanism("dissipation_heating").unwrap();
+    let slots = heating.slots(&Structure::of(&simulation));
+    assert_eq!(slots.iter().map(|s| s.label.as_str()).collect::<Vec<_>>(), ["parameter:R"]);
+    let signals = example_signals(&simulation, &slots[0]);
+    let heat = |purpose| {
+        let written = heating.rewrite(&simulation, &slots[0], &signals, purpose).unwrap().simulation;
+        written.state("theta").unwrap().derivative.to_string()
+    };
+    assert_eq!(heat(Purpose::Refit), "((1 + beta*theta)*i^2 - theta)/tau_h");
+    assert_eq!(heat(Purpose::Form(Form::Other)), "((1 + beta*theta)*abs(i) - theta)/tau_h");
+}
+
+/// Where another store is fed through the opening a loss along Torricelli's law is one of its own.
+#[test]
+fn a_store_may_leak_in_proportion_or_through_an_opening() {
+    let leakage = crate::mechanism::mechanism("leakage").unwrap();
+    let mut seen = 0;
+    for bench in benches() {
+        for (slot, signals) in bench.slots(leakage).into_iter().filter(|(slot, _)| !slot.has("k")) {
+            let outflow = |purpose| {
+                let written = leakage.rewrite(&bench.simulation, &slot, &signals, purpose).unwrap().simulation;
+                written.expressions().iter().any(|(_, e)| e.to_string().contains("q_l*sqrt(max("))
+            };
+            assert!(outflow(Purpose::Form(Form::Other)) && !outflow(Purpose::Refit), "{slot}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 0);
+}
+
+/// Friction that sticks beside one that creeps is another machine: what a smoothed friction lacks is smoothed alike.
+#[test]
+fn what_a_friction_lacks_is_written_as_the_simulation_has_it() {
+    let servo = specimens().into_iter().find(|s| s.title.starts_with("Servo")).unwrap();
+    let sharp = servo.state("v").unwrap().derivative.to_string();
+    assert!(sharp.contains("sign(v)"), "{sharp}");
+    let written = |own: &str, id: &str| {
+        let mut simulation = servo.clone();
+        simulation.state_mut("v").unwrap().derivative = Expr::parse(&sharp.replace("sign(v)", own)).unwrap();
+        let mechanism = crate::mechanism::mechanism(id).unwrap();
+        let slot = mechanism.slots(&Structure::of(&simulation)).into_iter().find(|s| s.label == "state:v").unwrap();
+        let signals = example_signals(&simulation, &slot);
+        let written = mechanism.rewrite(&simulation, &slot, &signals, Purpose::Refit).unwrap();
+        written.simulation.state("v").unwrap().derivative.to_string()
+    };
+    for own in ["tanh(v/0.01)", "tanh(50*v)"] {
+        let stribeck = written(own, "stribeck_friction");
+        assert!(stribeck.contains(&format!("exp(-(v/v_s)^2)*{own}")) && !stribeck.contains("sign("), "{stribeck}");
+        assert!(written(own, "asymmetric_friction").contains(&format!("F_a*abs({own})")));
+    }
+    assert!(written("sign(v)", "stribeck_friction").contains("exp(-(v/v_s)^2)*sign(v)"));
+}
+
+/// Bristles stand in the place of the simulation's own dry friction, where it has one.
+#[test]
+fn a_law_can_take_the_place_of_what_it_contains() {
+    let dahl = crate::mechanism::mechanism("dahl_friction").unwrap();
+    let own = |title: &str| {
+        let simulation = specimens().into_iter().find(|s| s.title.starts_with(title)).unwrap();
+        let slot = dahl.slots(&Structure::of(&simulation)).remove(0);
+        dahl.stands_for(&slot).map(str::to_owned)
+    };
+    let servo = specimens().into_iter().find(|s| s.title.starts_with("Servo")).unwrap();
+    let name = own("Servo").unwrap();
+    assert!(servo.parameter(&name).is_some(), "{name}");
+    assert_eq!(own("Oscillator"), None);
+}

@@ -1,6 +1,6 @@
 //! Dry friction of different size in the two directions.
 
-use super::is_there;
+use super::{is_there, sign};
 use crate::mechanism::{Block, Family, Law, Mechanism, Need};
 use crate::slot::Place;
 
@@ -15,7 +15,7 @@ pub static ASYMMETRIC_FRICTION: Mechanism = Mechanism {
     law: |slot, _| {
         if is_there(slot) {
             // The symmetric part is there already: only what the directions differ by.
-            return Law::force("F_a*abs(sign(v))").amplitude("F_a", "F", -1.0, 1.0).sum_of_others();
+            return Law::force(format!("F_a*abs({})", sign(slot))).amplitude("F_a", "F", -1.0, 1.0).sum_of_others();
         }
         // Dry friction and a constant force, sticking included.
         Law::force("(F_c + F_a*sign(v))*sign(v)")

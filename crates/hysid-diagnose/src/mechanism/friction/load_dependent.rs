@@ -1,6 +1,6 @@
 //! Dry friction that grows with the transmitted load.
 
-use super::is_there;
+use super::{is_there, sign};
 use crate::mechanism::{Block, Family, Law, Mechanism, Need};
 use crate::slot::Place;
 
@@ -14,7 +14,7 @@ pub static LOAD_DEPENDENT_FRICTION: Mechanism = Mechanism {
     already: &["abs(u)*sign(v)"],
     law: |slot, _| {
         if is_there(slot) {
-            return Law::force("mu*abs(u)*sign(v)").amplitude("mu", "F/u", 0.0, 1.0);
+            return Law::force(format!("mu*abs(u)*{}", sign(slot))).amplitude("mu", "F/u", 0.0, 1.0);
         }
         Law::force("(F_c + mu*abs(u))*sign(v)").amplitude("F_c", "F", 0.0, 1.0).amplitude("mu", "F/u", 0.0, 1.0)
     },

@@ -8,10 +8,13 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
     id: "asymmetric_bouc_wen",
     family: Family::HystereticSpring,
     block: Block::Hysteresis,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
-    applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Loop],
+    applies: super::beside_none_or_in_one,
     already: &[],
-    law: |_, purpose| {
+    law: |slot, purpose| {
+        if slot.place == Place::Loop {
+            return Law::force("a_z*(v*z + abs(v)*abs(z))").amplitude("a_z", "F/(v*z)", -1.0, 1.0);
+        }
         // The share a makes z tend to 1/(1 + 2 a)^(1/n) upwards and to 1/(1 - 2 a)^(1/n) downwards.
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
@@ -29,7 +32,7 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
     contains: &["bouc_wen", "dahl_friction"],
     confusable: &["bouc_wen", "quadratic_stiffness"],
     needs: &[Need::Reversals("v", 6), Need::BothSides("x"), Need::Levels("x", 1.5)],
-    sentence: "A hysteretic spring with unequal branches acts {place}: it yields over {x_y} at {F_h}, the branches differing by twice the share {a_z}.",
+    sentence: "A hysteretic spring with unequal branches acts {place}[: it yields over {x_y} at {F_h}], the branches differing by twice {a_z}.",
     signature: "Unequal upper and lower branches; even harmonics together with a loop.",
     reference: "C.-H. Wang, Y.-K. Wen, Evaluation of pre-Northridge low-rise steel buildings I: modeling, J. Struct. Eng. 126 (2000) 1151-1160",
 };

@@ -1,6 +1,6 @@
 //! A hysteretic spring that weakens with the energy it has dissipated.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_grid};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
 /// A hysteretic spring that weakens with the energy it has dissipated.
@@ -8,10 +8,13 @@ pub static DEGRADATION: Mechanism = Mechanism {
     id: "degradation",
     family: Family::HystereticSpring,
     block: Block::Hysteresis,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
-    applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Loop],
+    applies: super::beside_none_or_in_one,
     already: &[],
-    law: |_, purpose| {
+    law: |slot, purpose| {
+        if slot.place == Place::Loop {
+            return of_the_loop(purpose);
+        }
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
@@ -29,7 +32,23 @@ pub static DEGRADATION: Mechanism = Mechanism {
     contains: &["bouc_wen", "dahl_friction"],
     confusable: &["parameter_drift", "dissipation_heating"],
     needs: &[Need::Reversals("v", 6), Need::EarlyAndLate("x")],
-    sentence: "A hysteretic spring that weakens as it works acts {place}: it yields over {x_y} at {F_h} at first.",
+    sentence: "A hysteretic spring that weakens as it works acts {place}[: it yields over {x_y} at {F_h} at first].",
     signature: "A change in one direction that follows the dissipated energy, not the clock.",
     reference: "T. T. Baber, Y.-K. Wen, Random vibration of hysteretic degrading systems, J. Eng. Mech. Div. 107 (1981) 1069-1087",
 };
+
+/// A loop of the simulation that wears out: what drives it weakens (`d_A`), what bends it grows (`d_nu`), all of it slows down (`d_eta`), with the
+/// energy that it has dissipated. One of them until the recording tells more.
+fn of_the_loop(purpose: Purpose) -> Law {
+    let measured = |law: Law, name: &str| law.amplitude(name, "1/(z*v*T)", 0.0, 20.0);
+    let law = match purpose {
+        Purpose::Form(Form::Other) => measured(Law::force("d_eta*e/(1 + d_eta*e)*rate"), "d_eta"),
+        Purpose::Form(Form::Few) => measured(Law::force("-d_nu*e*(rate - drive)"), "d_nu"),
+        Purpose::Form(Form::Finer) => {
+            let worn = "((1 - min(d_A*e, 0.95))*drive + (1 + d_nu*e)*(rate - drive))/(1 + d_eta*e)";
+            ["d_A", "d_nu", "d_eta"].into_iter().fold(Law::force(format!("rate - {worn}")), measured)
+        }
+        _ => measured(Law::force("min(d_A*e, 0.95)*drive"), "d_A"),
+    };
+    law.state("e", "z*v*T", "max(z*v, 0)")
+}

@@ -8,10 +8,19 @@ pub static PINCHING: Mechanism = Mechanism {
     id: "pinching",
     family: Family::HystereticSpring,
     block: Block::Hysteresis,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
-    applies: |slot| slot.has("x") && slot.has("v") && !slot.loops(),
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Loop],
+    applies: super::beside_none_or_in_one,
     already: &[],
-    law: |_, purpose| {
+    law: |slot, purpose| {
+        if slot.place == Place::Loop {
+            return Law::force("zeta_1*exp(-((z*sign(v)/z_u - q_z)/zeta_2)^2)*rate")
+                .amplitude("zeta_1", "1", 0.0, 0.97)
+                .shape("zeta_2", "1", log_grid(0.1, 0.6, 3))
+                .within(0.02, 2.0)
+                .detail(purpose, "q_z", "1", vec![0.1], (-0.5, 0.9))
+                .constant("z_u", "z", Grid::Reach("z", vec![1.0]))
+                .silent();
+        }
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
@@ -28,7 +37,7 @@ pub static PINCHING: Mechanism = Mechanism {
     contains: &["bouc_wen", "dahl_friction"],
     confusable: &["spring_clearance", "displacement_dependent_damping", "bouc_wen"],
     needs: &[Need::Reversals("v", 6), Need::Levels("x", 1.5)],
-    sentence: "A hysteretic spring that pinches acts {place}: it yields over {x_y} at {F_h} and slips near the middle (slip {zeta_1}).",
+    sentence: "A hysteretic spring that pinches acts {place}[: it yields over {x_y} at {F_h}] and slips near the middle (slip {zeta_1}).",
     signature: "A pinched loop: little stiffness near the middle after sliding.",
     reference: "T. T. Baber, M. N. Noori, Random vibration of degrading, pinching systems, J. Eng. Mech. 111 (1985) 1010-1026",
 };

@@ -14,7 +14,7 @@ pub static INPUT_POLYNOMIAL: Mechanism = Mechanism {
     law: |_, purpose| {
         // Through zero; or about the point of operation, where the simulation's gain holds: about zero such a curve has an offset, which
         // would count as an effect of its own.
-        let middle = purpose == Purpose::Form(Form::Smooth);
+        let middle = purpose == Purpose::Form(Form::Other);
         let law = Law::replace(if middle { "u + b_2*(u - u_o)^2 + b_3*(u - u_o)^3" } else { "u + b_2*u^2 + b_3*u^3" })
             .amplitude("b_2", "1/u", -1.0, 1.0)
             .amplitude("b_3", "1/u^2", -1.0, 1.0);

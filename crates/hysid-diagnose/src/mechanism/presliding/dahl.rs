@@ -15,8 +15,8 @@ pub static DAHL_FRICTION: Mechanism = Mechanism {
         Law::force("F_c*z")
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.02, 1.0, 5))
-            .within(0.005, 5.0)
-            .at_least(0.15, "v*h")
+            .within(5e-4, 5.0)
+            .at_least(0.03, "v*h")
             .relaxing("z", "v - abs(v)*z", "z_s")
             .report("sigma_0", "F/x", "F_c/z_s")
     },

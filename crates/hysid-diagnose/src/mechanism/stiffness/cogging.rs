@@ -17,9 +17,9 @@ pub static COGGING: Mechanism = Mechanism {
             .silent()
             .amplitude("A_c", "F", -1.0, 1.0)
             .silent()
-            .shape("p_x", "x", Grid::Reach("x", log_steps(0.05, 1.0, 40)))
+            .shape("p_x", "x", Grid::Turns("x", log_steps(0.05, 1.0, 40)))
             // Three standard deviations are about the whole travel: a longer period is a curved spring and no ripple.
-            .within(0.005, 3.0)
+            .within(2e-4, 3.0)
             .searched()
             .report("A", "F", "sqrt(A_s^2 + A_c^2)")
             .report("phi", "1", "atan2(A_c, A_s)")

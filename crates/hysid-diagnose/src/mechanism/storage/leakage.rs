@@ -1,6 +1,6 @@
 //! A store that loses what it holds.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
 /// A store that loses what it holds.
@@ -11,9 +11,9 @@ pub static LEAKAGE: Mechanism = Mechanism {
     places: &[Place::Store],
     applies: |slot| !(slot.has("k") && slot.shows_root("s")),
     already: &[],
-    law: |slot, _| {
+    law: |slot, purpose| {
         // A loss in proportion would be a change of a parameter where the baseline has one.
-        if slot.has("k") {
+        if slot.has("k") || purpose == Purpose::Form(Form::Other) {
             // Torricelli's law; the reference level keeps the unit of q_l that of a flow.
             Law::outflow("q_l*sqrt(max(s, 0)/s_r)").amplitude("q_l", "F", 0.0, 2.0).constant(
                 "s_r",

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
 /// A parameter that follows the heat of the dissipated power.
@@ -13,21 +13,23 @@ pub static DISSIPATION_HEATING: Mechanism = Mechanism {
     places: &[Place::Parameter],
     applies: |slot| slot.has("v") && !slot.is_mass(),
     already: &["p*(1 + P*Z)"],
-    law: |slot, _| {
+    law: |slot, purpose| {
+        // The power of a force in proportion to the speed, or of one that has a size of its own at any speed.
+        let (power, measure) = if purpose == Purpose::Form(Form::Other) { ("abs(v)", "v") } else { ("v^2", "v^2") };
         // What dissipates less when it is hot heats itself less.
-        let heat = if slot.dissipates() { "((1 + beta*theta)*v^2 - theta)/tau_h" } else { "(v^2 - theta)/tau_h" };
+        let share = if slot.dissipates() { "(1 + beta*theta)*" } else { "" };
         Law::replace("p*(1 + beta*theta)")
-            .amplitude("beta", "1/v^2", -0.9, 3.0)
+            .amplitude("beta", format!("1/{measure}"), -0.9, 3.0)
             .shape("tau_h", "T", Grid::Values(vec![0.05, 0.2, 0.6]))
             .within(0.01, 5.0)
             // One period of the motion.
             .told_from(TAU, "x/v", "what follows within one period of the motion is a law of the motion")
-            .state("theta", "v^2", heat)
+            .state("theta", measure, format!("({share}{power} - theta)/tau_h"))
     },
     contains: &[],
     confusable: &["parameter_drift", "degradation"],
     needs: &[Need::ActivityChange("v")],
-    sentence: "{parameter} follows the heat of the motion with a time constant of {tau_h}: {beta}.",
+    sentence: "{parameter} follows the heat that is dissipated with a time constant of {tau_h}: {beta}.",
     signature: "It follows the activity and recovers in pauses.",
     reference: "B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer (1991)",
 };

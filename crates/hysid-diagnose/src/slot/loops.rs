@@ -1,0 +1,88 @@
+//! The loops that a simulation has: states beside the motions that move with the size of a velocity, as Bouc and Wen's `z`.
+
+use hysid_plant::{Expr, Function, Memory};
+
+use super::algebra::size;
+use super::find::Finder;
+use super::motion::{ForcePath, Kinematic, force_path};
+use super::{Place, Pull, Slot, Target};
+
+impl Finder<'_> {
+    /// A slot in each loop of the simulation: what bends, pinches or wears it out enters its rate.
+    pub(super) fn own_loops(&self) -> Vec<Slot> {
+        let states = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some());
+        let loops = states.filter(|s| !self.moves(&s.name));
+        loops.filter_map(|s| self.own_loop(&s.name, &s.derivative)).collect()
+    }
+
+    fn own_loop(&self, name: &str, derivative: &Expr) -> Option<Slot> {
+        let v = self.looped_velocity(name, derivative)?;
+        let target = Target::Derivatives(vec![Pull::new(name, 1.0)]);
+        let mut slot = Slot::new(Place::Loop, format!("state:{name}"), format!("in the loop of {name}"), target);
+        // Where a law enters above the line it is measured by what stands there.
+        let rate = match force_path(self.simulation, derivative) {
+            ForcePath::Quotient(above, _) => above.clone(),
+            ForcePath::Divided(below) => below.clone() * derivative.clone(),
+            ForcePath::Bare => derivative.clone(),
+        };
+        // What drives the loop at rest in its middle.
+        let free = rate.terms().into_iter().filter(|(_, term)| !term.uses(name));
+        let signed = free.map(|(sign, term)| if sign < 0.0 { -term.clone() } else { term.clone() });
+        let drive = signed.reduce(|a, b| a + b).unwrap_or_else(|| rate.substitute(name, &Expr::Number(0.0)));
+        slot.offer(self.simulation, "z", Expr::symbol(name));
+        slot.offer(self.simulation, "v", v.clone());
+        slot.offer(self.simulation, "F", size(self.simulation, &rate));
+        slot.offer(self.simulation, "rate", rate);
+        slot.offer(self.simulation, "drive", drive.simplified());
+        if let Some(x) = self.motions.iter().find(|m| v == Expr::symbol(m.v)).and_then(|m| m.x) {
+            slot.offer(self.simulation, "x", Expr::symbol(x));
+        }
+        slot.context = vec![derivative.clone()];
+        Some(slot)
+    }
+
+    /// The velocity whose size the rate of a state holds.
+    fn looped_velocity(&self, name: &str, derivative: &Expr) -> Option<Expr> {
+        let mut found = None;
+        derivative.visit(&mut |e| {
+            if let Expr::Call(Function::Abs, a) = e
+                && let Some(a) = a.first()
+                && !a.uses(name)
+                && self.is_velocity(a)
+            {
+                found.get_or_insert_with(|| a.clone());
+            }
+        });
+        found
+    }
+
+    fn is_velocity(&self, e: &Expr) -> bool {
+        let mut rate = false;
+        e.visit(&mut |e| rate |= matches!(e, Expr::Memory(Memory::Derivative, _)));
+        let moving = |s: &String| {
+            self.motions.iter().any(|m| m.v == *s)
+                || (self.simulation.input(s).is_some() && self.kinematic_input(s) == Kinematic::Velocity)
+        };
+        rate || e.symbols().iter().any(moving)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::connections::tests::slots_of;
+    use super::*;
+
+    #[test]
+    fn a_loop_is_a_state_that_moves_with_the_size_of_a_velocity() {
+        let check = |rate: &str, expected: Option<[&str; 3]>| {
+            let found =
+                slots_of(Place::Loop, &[("x", "w2", "m"), ("w2", "(u - k*x - c*z2)/J", "m/s"), ("z2", rate, "-")]);
+            let told = |s: &Slot| ["v", "drive", "rate"].map(|n| s.quantity(n).unwrap().expression.to_string());
+            assert_eq!(found.first().map(told), expected.map(|e| e.map(str::to_owned)), "{rate}");
+        };
+        check("k*w2 - k*abs(w2)*z2", Some(["w2", "k*w2", "k*w2 - k*abs(w2)*z2"]));
+        check("(w2 - abs(w2)*z2)/k", Some(["w2", "w2", "w2 - abs(w2)*z2"]));
+        check("k*w2 - c*z2", None);
+        check("k*w2 - c*abs(z2)*z2", None);
+    }
+}
