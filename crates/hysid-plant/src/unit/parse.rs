@@ -12,7 +12,7 @@ impl Unit {
         if matches!(trimmed, "" | "-" | "1") {
             return Ok(Self::none());
         }
-        let mut reader = Reader { left: trimmed };
+        let mut reader = Reader { left: trimmed, depth: 0 };
         let unit = reader.product().and_then(|unit| match reader.left {
             "" => Ok(unit),
             _ => Err("a `)` has no `(`"),
@@ -23,9 +23,13 @@ impl Unit {
 
 type Read<T> = Result<T, &'static str>;
 
-/// What is left of a text.
+/// Parentheses within each other beyond which a text is no unit.
+const DEEPEST: usize = 8;
+
+/// What is left of a text, and the parentheses that are open there.
 struct Reader<'a> {
     left: &'a str,
+    depth: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -111,7 +115,12 @@ impl<'a> Reader<'a> {
 
     fn parenthesis(&mut self) -> Read<Unit> {
         self.take_if(|c| c == '(');
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err("there are too many parentheses within each other");
+        }
         let inner = self.product()?;
+        self.depth -= 1;
         self.take_if(|c| c == ')').map(|_| inner).ok_or("a `(` has no `)`")
     }
 
@@ -241,5 +250,6 @@ mod tests {
         check("m^(1/0)", "0 or larger");
         check("m^0.37", "only exponents");
         check("(m^0.05)^0.05", "only exponents");
+        check(&"(".repeat(100_000), "too many parentheses");
     }
 }
