@@ -33,8 +33,9 @@ const WAY: f64 = 0.4;
 /// Places in each of the shortest periods.
 const PLACES: f64 = 3.0;
 
-/// For each slot of a structure the periods over its displacement at which the residual has lines; none where nothing moves far enough.
-pub fn residual_periods(base: &Base<'_>, structure: &Structure) -> Vec<Vec<f64>> {
+/// For each slot of a structure the periods over its displacement at which the whitened residual `r`, off the tangent space of the unknowns, has lines;
+/// none where nothing moves far enough.
+pub fn residual_periods(base: &Base<'_>, structure: &Structure, r: &[f64]) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new(); structure.slots.len()];
     let moves = |s: &Slot| matches!(s.place, Place::Force | Place::ForceLaw) && s.has("x");
     let places: Vec<usize> = (0..structure.slots.len()).filter(|&i| moves(&structure.slots[i])).take(MOST.0).collect();
@@ -45,7 +46,7 @@ pub fn residual_periods(base: &Base<'_>, structure: &Structure) -> Vec<Vec<f64>>
     if rulers.iter().all(Option::is_none) {
         return out;
     }
-    let Some(scores) = scores(base, places.iter().map(|&i| &structure.slots[i])) else { return out };
+    let Some(scores) = scores(base, places.iter().map(|&i| &structure.slots[i]), r) else { return out };
     for (k, (&i, ruler)) in places.iter().zip(&rulers).enumerate() {
         let Some(ruler) = ruler else { continue };
         let mut over = scores.iter().map(|of| ruler.sums(&along[k], &of[k]));
@@ -63,7 +64,7 @@ pub fn residual_periods(base: &Base<'_>, structure: &Structure) -> Vec<Vec<f64>>
 }
 
 /// The score of a force at each of these slots at each instant, of the residual and of noise: `[residual][slot][stretch][sample]`.
-fn scores<'s>(base: &Base<'_>, slots: impl Iterator<Item = &'s Slot>) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
+fn scores<'s>(base: &Base<'_>, slots: impl Iterator<Item = &'s Slot>, r: &[f64]) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
     let mut document = base.document();
     let own = document.inputs.len();
     for slot in slots {
@@ -84,10 +85,9 @@ fn scores<'s>(base: &Base<'_>, slots: impl Iterator<Item = &'s Slot>) -> Option<
     }
     let data = base.model.data().with_still_inputs(document.inputs.len() - own);
     let model = Model::new(&document, &data, base.model.substeps()).ok()?;
-    let (_, r) = base.evidence();
     let mut rng = generator(0, STREAM);
     let white = (0..NOISES).map(|_| (0..r.len()).map(|_| StandardNormal.sample(&mut rng)).collect::<Vec<f64>>());
-    let all: Vec<Vec<f64>> = std::iter::once(r.clone()).chain(white).collect();
+    let all: Vec<Vec<f64>> = std::iter::once(r.to_vec()).chain(white).collect();
     let mut scores = model.scores(&model.theta(&base.values()), &base.whitener, &all)?;
     scores.iter_mut().for_each(|by_input| drop(by_input.drain(..own)));
     Some(scores)
@@ -161,7 +161,7 @@ mod tests {
         let budget = Budget::new(&|_| false);
         let (_, none) = calibrated(simulation, &data, NoiseKind::White(1.0), &budget);
         let structure = Structure::of(none.base.model.simulation());
-        residual_periods(&none.base, &structure).concat()
+        residual_periods(&none.base, &structure, &none.base.evidence().1).concat()
     }
 
     #[test]

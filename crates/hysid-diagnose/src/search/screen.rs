@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::peaks::residual_peaks;
 use super::ripple::residual_periods;
 use crate::evidence::{FeatureGroup, Projector, norm2, score};
-use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, catalogue};
+use crate::mechanism::{Family, Mechanism, Purpose, Rewritten, Signals, catalogue};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Key};
 use crate::model::{Model, Values, along};
@@ -161,7 +161,10 @@ pub fn screen(
     let structure = Structure::within(&document, original);
     let bare = Structure::of(original);
     let peaks = residual_peaks(base);
-    let at = signals(base, &structure, &peaks, &residual_periods(base, &structure));
+    let ripples = || catalogue().iter().filter(|m| m.family == Family::PositionRipple);
+    let looked_for = structure.slots.iter().any(|slot| ripples().any(|m| m.fits(slot) && keep(m, slot)));
+    let periods = if looked_for { residual_periods(base, &structure, r) } else { Vec::new() };
+    let at = signals(base, &structure, &peaks, &periods);
     let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();
     for mechanism in catalogue() {
         for (place, slot) in structure.slots.iter().enumerate() {

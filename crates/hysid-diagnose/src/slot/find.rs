@@ -1,6 +1,6 @@
 //! The slots of a simulation, found from its equations.
 
-use hysid_plant::{Expr, Function, Memory, Simulation, State, Unit};
+use hysid_plant::{Expr, Memory, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
 use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
@@ -90,15 +90,6 @@ impl Finder<'_> {
     /// Whether a state is the displacement or the velocity of a part.
     pub(super) fn moves(&self, name: &str) -> bool {
         self.motions.iter().any(|m| m.v == name || m.x == Some(name))
-    }
-
-    /// Whether a state besides the motions has a loop in this velocity.
-    pub(super) fn loops(&self, v: &Expr) -> bool {
-        let mut found = false;
-        for state in self.simulation.states.iter().filter(|s| !self.moves(&s.name)) {
-            state.derivative.visit(&mut |e| found |= matches!(e, Expr::Call(Function::Abs, a) if a.first() == Some(v)));
-        }
-        found
     }
 
     fn inputs(&self) -> Vec<Slot> {

@@ -15,8 +15,14 @@ impl Finder<'_> {
         loops.filter_map(|s| self.own_loop(&s.name, &s.derivative)).collect()
     }
 
+    /// Whether a state besides the motions has a loop in this velocity.
+    pub(super) fn loops(&self, v: &Expr) -> bool {
+        let others = self.simulation.states.iter().filter(|s| !self.moves(&s.name));
+        others.into_iter().any(|s| size_of(&s.derivative, |a| a == v).is_some())
+    }
+
     fn own_loop(&self, name: &str, derivative: &Expr) -> Option<Slot> {
-        let v = self.looped_velocity(name, derivative)?;
+        let v = size_of(derivative, |a| !a.uses(name) && self.is_velocity(a))?;
         let target = Target::Derivatives(vec![Pull::new(name, 1.0)]);
         let mut slot = Slot::new(Place::Loop, format!("state:{name}"), format!("in the loop of {name}"), target);
         // Where a law enters above the line it is measured by what stands there.
@@ -41,21 +47,6 @@ impl Finder<'_> {
         Some(slot)
     }
 
-    /// The velocity whose size the rate of a state holds.
-    fn looped_velocity(&self, name: &str, derivative: &Expr) -> Option<Expr> {
-        let mut found = None;
-        derivative.visit(&mut |e| {
-            if let Expr::Call(Function::Abs, a) = e
-                && let Some(a) = a.first()
-                && !a.uses(name)
-                && self.is_velocity(a)
-            {
-                found.get_or_insert_with(|| a.clone());
-            }
-        });
-        found
-    }
-
     fn is_velocity(&self, e: &Expr) -> bool {
         let mut rate = false;
         e.visit(&mut |e| rate |= matches!(e, Expr::Memory(Memory::Derivative, _)));
@@ -65,6 +56,19 @@ impl Finder<'_> {
         };
         rate || e.symbols().iter().any(moving)
     }
+}
+
+/// The first expression of that kind whose size a rate holds.
+fn size_of(rate: &Expr, wanted: impl Fn(&Expr) -> bool) -> Option<Expr> {
+    let mut found = None;
+    rate.visit(&mut |e| {
+        if let Expr::Call(Function::Abs, a) = e
+            && found.is_none()
+        {
+            found = a.first().filter(|a| wanted(a)).cloned();
+        }
+    });
+    found
 }
 
 #[cfg(test)]
