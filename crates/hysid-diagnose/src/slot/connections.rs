@@ -84,7 +84,7 @@ impl Finder<'_> {
                 alone.next().is_none().then(|| if sign < 0.0 { -own } else { own })
             };
             let rate = spring(one)?;
-            let mut pulls = vec![Pull::new(one.v, 1.0)];
+            let mut pulls = vec![Pull::new(one.state, 1.0)];
             for other in self.motions.iter().filter(|m| m.v != one.v) {
                 let mut terms = forces_of(self.simulation, other).filter(|(_, t)| t.uses(x));
                 if terms.any(|(_, t)| t.uses(other.v) || other.x.is_some_and(|x2| t.uses(x2))) {
@@ -97,10 +97,10 @@ impl Finder<'_> {
                 if rate.symbols().iter().any(|s| ratio.uses(s)) {
                     return None;
                 }
-                pulls.push(Pull { lever: unless_one(ratio), ..Pull::new(other.v, sign) });
+                pulls.push(Pull { lever: unless_one(ratio), ..Pull::new(other.state, sign) });
             }
             let [_, other, ..] = &pulls[..] else { return None };
-            let other = self.motions.iter().find(|m| m.v == other.state)?;
+            let other = self.motions.iter().find(|m| m.state == other.state)?;
             let stretch = Stretch {
                 x: Expr::symbol(x),
                 v: one.rate(),
@@ -193,9 +193,9 @@ impl Finder<'_> {
     /// The force between two parts, over the deflection of what connects them.
     fn connection(&self, one: &Motion<'_>, stretch: Stretch<'_>) -> Slot {
         let Stretch { x, v, symbol, sign, lever, other, words } = stretch;
-        let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.v, 1.0) }];
-        pulls.extend(other.map(|other| Pull::new(other.v, -1.0)));
-        let mut slot = Slot::new(Place::Connection, format!("state:{}", one.v), words, Target::Derivatives(pulls));
+        let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.state, 1.0) }];
+        pulls.extend(other.map(|other| Pull::new(other.state, -1.0)));
+        let mut slot = Slot::new(Place::Connection, format!("state:{}", one.state), words, Target::Derivatives(pulls));
         slot.loops = self.loops(&v);
         slot.offer(self.simulation, "x", x);
         slot.offer(self.simulation, "v", v);

@@ -89,7 +89,7 @@ impl Finder<'_> {
 
     /// Whether a state is the displacement or the velocity of a part.
     pub(super) fn moves(&self, name: &str) -> bool {
-        self.motions.iter().any(|m| m.v == name || m.x == Some(name))
+        self.motions.iter().any(|m| m.v == name || m.state == name || m.x == Some(name))
     }
 
     fn inputs(&self) -> Vec<Slot> {

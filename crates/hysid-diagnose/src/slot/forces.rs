@@ -56,7 +56,7 @@ impl Finder<'_> {
     }
 
     pub(super) fn motion_slot(&self, place: Place, label: String, motion: &Motion<'_>) -> Slot {
-        let target = Target::Derivatives(vec![Pull::new(motion.v, 1.0)]);
+        let target = Target::Derivatives(vec![Pull::new(motion.state, 1.0)]);
         let mut slot = Slot::new(place, label, format!("at {}", motion.name()), target);
         let v = Expr::symbol(motion.v);
         slot.loops = self.loops(&v);
@@ -76,7 +76,7 @@ impl Finder<'_> {
     }
 
     pub(super) fn forces(&self) -> Vec<Slot> {
-        self.motions.iter().map(|m| self.motion_slot(Place::Force, format!("state:{}", m.v), m)).collect()
+        self.motions.iter().map(|m| self.motion_slot(Place::Force, format!("state:{}", m.state), m)).collect()
     }
 
     /// The input by which a damping force is controlled, as the voltage of a magnetorheological damper: the coefficient of the velocity
@@ -162,5 +162,13 @@ mod tests {
         // A store that a flow fills, and what depends on more than a velocity, are no displacements.
         check("0.01*w2", "K", "w2");
         check("1000*(w2 - k*x)", "mm", "w2");
+    }
+
+    #[test]
+    fn what_acts_behind_a_chain_of_integrators_depends_on_the_motion_at_its_end() {
+        let chain = [("y", "w1", "mm"), ("w1", "w2", "mm/s"), ("w2", "k*(u - w1) - J*y - c*w2", "mm/s^2")];
+        let found = slots(Place::Force, &chain);
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0][..2], ["y", "w1"]);
     }
 }

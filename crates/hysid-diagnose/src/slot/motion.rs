@@ -49,6 +49,8 @@ pub(super) fn force_of<'a>(simulation: &Simulation, derivative: &'a Expr) -> (&'
 pub(super) struct Motion<'a> {
     pub x: Option<&'a str>,
     pub v: &'a str,
+    /// The state whose derivative holds the forces: the velocity, or what is integrated to it.
+    pub state: &'a str,
     pub derivative: &'a Expr,
     /// What the rate of the displacement is for each unit of the velocity where that is not one: `1000` from m/s to mm, `1/m` from a momentum.
     pub scale: Option<Expr>,
@@ -128,17 +130,23 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
             Some(x) => (Some(x), None),
             None => known().find_map(|s| Some((s, scaled(&s)?))).unzip(),
         };
-        // A chain x' = v, v' = a, a' = ...: v is then a displacement's velocity only, not one with a force.
         let passes_on = matches!(&velocity.derivative, Expr::Symbol(s) if original.state(s).is_some());
         let alone = kinematic(velocity.unit.as_ref(), &velocity.name) == Kinematic::Velocity;
-        if !passes_on && (position.is_some() || alone) {
-            found.push(Motion {
-                x: position.map(|s| s.name.as_str()),
-                v: &velocity.name,
-                derivative: &velocity.derivative,
-                scale,
-            });
+        if passes_on || !(position.is_some() || alone) {
+            continue;
         }
+        // A chain x' = v, v' = a, a' = ...: what acts on a depends on where and how fast the part is; v is no displacement.
+        let first = position.filter(|_| scale.is_none()).and_then(|v| {
+            known().find(|x| x.derivative == Expr::symbol(&v.name)).map(|x| (x, v))
+        });
+        let (x, v) = first.map_or((position, velocity), |(x, v)| (Some(x), v));
+        found.push(Motion {
+            x: x.map(|s| s.name.as_str()),
+            v: &v.name,
+            state: &velocity.name,
+            derivative: &velocity.derivative,
+            scale,
+        });
     }
     found
 }
