@@ -243,7 +243,7 @@ fn written<'d>(
     let (winner, vetoed, foreign) = (judged.winner, judged.veto.is_some(), judged.rest.foreign);
     let risk = if winner > 0 && !vetoed { gamble(&search.setting, &judged.contest(pool)) } else { None };
     if let Some(share) = risk {
-        file.notes.push(format!("on the recorded inputs mirrored and reversed in time the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): no augmented simulation is written, since it may be worse than nothing there", number(share)));
+        file.notes.push(format!("on the recorded inputs mirrored, reversed in time or doubled the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): no augmented simulation is written, since it may be worse than nothing there", number(share)));
     }
     // Another recording sees another course of what wanders: what follows this one is worse than nothing there.
     let believed = winner > 0 && !vetoed && risk.is_none();

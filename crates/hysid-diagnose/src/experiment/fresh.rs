@@ -4,8 +4,8 @@
 //! nothing holds, is small until the drive goes there. Sets that are as likely tell how much hangs on the choice: should one of them be the
 //! truth, writing the likeliest set brings its distance from the truth, and writing nothing brings the baseline's. It is written where its
 //! expected loss is well below that of writing nothing. Inputs are the recorded ones mirrored (each about the middle of its range) and reversed in
-//! time: they have the same levels and the same band, and lead elsewhere. They begin as they were recorded and fade over, so that nothing hangs on
-//! how states begin.
+//! time, which have the same levels and the same band, and lead elsewhere; and twice as large, where a spring that softens by a power of the displacement
+//! pushes. They begin as they were recorded and fade over, so that nothing hangs on how states begin.
 //!
 //! Reference: J. O. Berger, Statistical Decision Theory and Bayesian Analysis, 2nd ed., Springer (1985), ch. 4.
 
@@ -97,7 +97,7 @@ pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
     }
     let (nothing, best) = (started(&pool[0].base), started(&pool[winner].base));
     let noise: Vec<f64> = pool[winner].base.whitener.models.iter().map(|m| m.noise_rms()).collect();
-    let changes: [fn(&[f64]) -> Vec<f64>; 2] = [mirror_image, reversed];
+    let changes: [fn(&[f64]) -> Vec<f64>; 3] = [mirror_image, reversed, doubled];
     changes
         .into_iter()
         .filter_map(|change| {
@@ -121,10 +121,21 @@ fn reversed(u: &[f64]) -> Vec<f64> {
     u.iter().rev().copied().collect()
 }
 
-/// A series about the middle of its range.
+/// A series mirrored about the middle of its range.
 fn mirror_image(u: &[f64]) -> Vec<f64> {
+    about_the_middle(u, -1.0)
+}
+
+/// A series twice as far from the middle of its range.
+fn doubled(u: &[f64]) -> Vec<f64> {
+    about_the_middle(u, 2.0)
+}
+
+/// A series so many times as far from the middle of its range.
+fn about_the_middle(u: &[f64], times: f64) -> Vec<f64> {
     let (low, high) = u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-    u.iter().map(|x| low + high - x).collect()
+    let middle = 0.5 * (low + high);
+    u.iter().map(|x| middle + times * (x - middle)).collect()
 }
 
 #[cfg(test)]
@@ -181,6 +192,19 @@ mod tests {
     }
 
     #[test]
+    fn dampers_that_say_the_same_part_where_the_input_is_doubled() {
+        let on = |change: fn(&[f64]) -> Vec<f64>| {
+            let drive_of = pushed();
+            let inputs = drive_of.inputs().iter().map(|u| change(u)).collect();
+            let fresh = Drive::new(0.0, 0.01, 600, inputs).unwrap();
+            let (cubic, lower) = (drive(0.5, " + 0.2*w^3"), drive(0.44, ""));
+            expected_share(&drive(0.5, ""), (0.5, &cubic), &[(0.5, lower)], &fresh, 4, &[1.0]).unwrap()
+        };
+        let (recorded, twice) = (on(<[f64]>::to_vec), on(doubled));
+        assert!(recorded < WORTH && twice > WORTH, "{recorded} {twice}");
+    }
+
+    #[test]
     fn an_unlikely_rival_that_goes_far_astray_does_not_outweigh_the_rest() {
         let astray = loss(0.9, &drive(0.6, ""), &[(0.1, drive(0.5, " + 0.9*max(q, 0)"))]).unwrap();
         assert!(astray < WORTH, "{astray}");
@@ -209,7 +233,7 @@ mod tests {
     #[test]
     fn a_fresh_input_begins_as_it_was_recorded() {
         let recorded: Vec<f64> = (0..100).map(|n| f64::from(n) + 1.0).collect();
-        for change in [mirror_image, reversed] {
+        for change in [mirror_image, reversed, doubled] {
             let fresh = faded(&recorded, &change(&recorded));
             assert_eq!(fresh[0], recorded[0]);
             assert_eq!(fresh[100 / RUN_IN..], change(&recorded)[100 / RUN_IN..]);

@@ -22,6 +22,8 @@ pub struct Explored<'a, 'd> {
     pub candidates: Vec<Candidate>,
     /// Whether simulation and recording differ by more than noise does.
     pub significant: bool,
+    /// Whether surrogates of the residual show it: what only the second look sees is weaker.
+    pub shown: bool,
     /// Of the mismatch test and of the second look, the smaller.
     pub p_value: f64,
     /// What the calibrated simulation leaves of each output (rms).
@@ -89,7 +91,8 @@ pub fn explore<'a, 'd>(
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(plain, options, hooks);
     let murky = none.base.gross() || none.base.far();
-    let mut significant = test.p_value < options.alpha;
+    let shown = test.p_value < options.alpha;
+    let mut significant = shown;
     // A slight colour matters where nothing is seen under it.
     let colour = none.base.coloured() || none.base.driven() || (!significant && none.base.whitener.coefficients() > 0);
     let heard = murky || (colour && !setting.budget.omits(Step::OtherNoise));
@@ -182,7 +185,7 @@ pub fn explore<'a, 'd>(
         }
     }
     pool.insert(0, none);
-    Explored { search, pool, candidates, significant, p_value, residual, detectable, least, notes }
+    Explored { search, pool, candidates, significant, shown, p_value, residual, detectable, least, notes }
 }
 
 #[cfg(test)]

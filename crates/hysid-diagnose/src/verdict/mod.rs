@@ -9,6 +9,7 @@ pub(crate) mod judgement;
 pub mod reliability;
 mod remaining;
 pub(crate) mod trifles;
+mod veto;
 mod wanders;
 pub(crate) mod weigh;
 mod wordings;

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use super::wordings::{collapses, shared, wordings};
 use super::{Claim, FIRM, Hypothesis as Weighed, probabilities};
 use crate::budget::Step;
-use crate::evidence::difference;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting, block_score};
 use crate::search::compose::best_of;
@@ -162,13 +161,6 @@ fn likeliest_families(sets: &[usize], preferred: usize, weighed: &[Weighed], pro
     best.0
 }
 
-/// Whether the winner predicts the held-out blocks worse than the simulation as it is, by more than a standard error: an effect that acts at a few
-/// moments only may leave all blocks as they are.
-pub fn worse_on_blocks(blocks: &[Option<(f64, Vec<f64>)>], winner: usize) -> bool {
-    let (Some(Some((_, none))), Some(Some((_, best)))) = (blocks.first(), blocks.get(winner)) else { return false };
-    difference(best, none).is_some_and(|(mean, error)| mean > error)
-}
-
 /// Whether a parameter of the effect stands at a bound: the law is not what the recording shows, a sibling may be meant.
 pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
     any_at_bound(base, effect.written.parameters_of().iter())
@@ -271,19 +263,6 @@ pub fn log_weights(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oscillator::normal;
-
-    #[test]
-    fn blocks_veto_what_they_refute_and_not_what_they_do_not_show() {
-        let mut random = normal(8);
-        let none: Vec<f64> = (0..400).map(|_| random().powi(2)).collect();
-        let judged = |of_best: Vec<f64>| worse_on_blocks(&[Some((0.0, none.clone())), Some((0.0, of_best))], 1);
-        // One effect leaves all blocks as they are but for what its parameters cost, one is better, one is worse throughout.
-        assert!(!judged(none.clone()));
-        assert!(!judged(none.iter().enumerate().map(|(i, e)| e + if i % 40 < 20 { 0.1 } else { -0.099 }).collect()));
-        assert!(!judged(none.iter().map(|e| 0.8 * e).collect()));
-        assert!(judged(none.iter().map(|e| 1.2 * e).collect()));
-    }
 
     #[test]
     fn what_is_told_first_is_not_outweighed_by_the_alternatives() {

@@ -1,0 +1,89 @@
+//! What speaks against writing a set of effects into the simulation: what it does to the error, on the recording and on blocks of it that it was not
+//! fitted to.
+//!
+//! Where an unknown force acts on the machine the error of a free run wanders, and by chance the true law leaves more of it on a recording than
+//! none: there what the noise model makes of the errors is compared, and not their squares.
+
+use crate::data::held_out_blocks;
+use crate::evidence::{difference, norm2};
+use crate::model::base::Base;
+use crate::model::hypothesis::Hypothesis;
+use crate::search::leaves_more;
+
+/// The score and the squared errors of a set on blocks that it was not fitted to.
+pub type OnBlocks = Option<(f64, Vec<f64>)>;
+
+/// Share of the log likelihood that a set must gain under the noise of the simulation as it is for its effects to explain.
+const EXPLAINED: f64 = 0.5;
+/// Share of what the recording tells of an amplitude that the rest must hold for the blocks to judge it.
+const TOLD: f64 = 0.1;
+
+/// What speaks against writing a set, in words. `none` is the simulation as it is under its own noise, `least` with the least error; `blocks` are those of `none`
+/// and of the set.
+pub fn veto(
+    none: &Hypothesis<'_>,
+    least: &Hypothesis<'_>,
+    best: &Hypothesis<'_>,
+    blocks: [&OnBlocks; 2],
+) -> Option<&'static str> {
+    let driven = none.base.driven() && best.base.driven();
+    let [before, after] = blocks.map(Option::as_ref);
+    let worse = before.zip(after).is_some_and(|(b, a)| if driven { a.0 < b.0 } else { is_worse(&a.1, &b.1) });
+    if worse && told_outside_blocks(best) {
+        Some(
+            "the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to",
+        )
+    } else if leaves_more(best, least) && !(driven && explains(&none.base, best)) {
+        Some(
+            "the best set of effects leaves a larger error than the simulation as it is, and what it gains is that the error looks more like noise: it explains nothing",
+        )
+    } else {
+        None
+    }
+}
+
+/// Whether squared errors on blocks are more by more than a standard error: an effect that acts at a few moments only may leave all blocks as they are.
+fn is_worse(after: &[f64], before: &[f64]) -> bool {
+    difference(after, before).is_some_and(|(mean, error)| mean > error)
+}
+
+/// Whether a good part of the likelihood that a set gains stays where the noise is still that of the simulation as it is.
+fn explains(none: &Base<'_>, best: &Hypothesis<'_>) -> bool {
+    let under_its_noise = |b: &Base<'_>| norm2(&none.whitener.apply(&none.model.data().layout, &b.fit.residual));
+    0.5 * (under_its_noise(none) - under_its_noise(&best.base))
+        > EXPLAINED * (best.base.log_likelihood - none.log_likelihood)
+}
+
+/// Whether what is not held out tells of each amplitude of a set: a store that overflows once does so in a block or out of all.
+fn told_outside_blocks(best: &Hypothesis<'_>) -> bool {
+    let (base, data) = (&best.base, best.base.model.data());
+    let unknowns = base.fit.theta.len();
+    let weights = held_out_blocks(&data.layout, &data.y);
+    let [all, rest] =
+        [None, Some(&weights[..])].map(|weights| base.fit.covariance(&data.layout, &base.whitener, weights, 1.0));
+    let amplitudes = best.effects.iter().flat_map(|e| &e.written.amplitudes);
+    amplitudes.filter_map(|a| base.model.place_of(&a.name)).all(|place| {
+        let variance = |of: &[f64]| of[place * (unknowns + 1)];
+        // An amplitude at a bound has no variance, one of which the rest tells nothing has none there.
+        variance(&all) <= 0.0 || (variance(&rest) > 0.0 && variance(&all) > TOLD * variance(&rest))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oscillator::normal;
+
+    #[test]
+    fn blocks_veto_what_they_refute_and_not_what_they_do_not_show() {
+        let mut random = normal(8);
+        let none: Vec<f64> = (0..400).map(|_| random().powi(2)).collect();
+        // One effect leaves all blocks as they are but for what its parameters cost, one is better, one is worse throughout.
+        assert!(!is_worse(&none, &none));
+        let by_turns: Vec<f64> =
+            none.iter().enumerate().map(|(i, e)| e + if i % 40 < 20 { 0.1 } else { -0.099 }).collect();
+        assert!(!is_worse(&by_turns, &none));
+        assert!(!is_worse(&none.iter().map(|e| 0.8 * e).collect::<Vec<_>>(), &none));
+        assert!(is_worse(&none.iter().map(|e| 1.2 * e).collect::<Vec<_>>(), &none));
+    }
+}
