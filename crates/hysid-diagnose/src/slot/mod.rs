@@ -180,6 +180,15 @@ impl Slot {
         self.inputs
     }
 
+    /// The inputs that enter the equations here, as they are offered.
+    pub(crate) fn entering(&self) -> Vec<String> {
+        let enters = |symbol: &String| {
+            let here = |name: &String| self.context.iter().any(|e| e.uses(name));
+            self.quantity(symbol).is_some_and(|q| q.expression.symbols().iter().any(here))
+        };
+        (1..=self.inputs).map(|i| format!("u_{i}")).filter(enters).collect()
+    }
+
     /// Whether a parameter of its own is added to the force or to the output here: an offset.
     pub fn has_constant(&self) -> bool {
         self.constant

@@ -3,7 +3,7 @@
 use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights, stretched};
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::mechanism::{Family, catalogue};
-use crate::model::hypothesis::Hypothesis;
+use crate::model::hypothesis::{Hypothesis, best_that_says};
 
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
@@ -48,7 +48,11 @@ pub fn firmness(
         let of_turned_noise = own.adds_what_noise_does() && beside("rectified_output");
         // What rounding leaves is neither white nor normal: a change by 0.12 % was firm beside it (report of seed 2383, 0010).
         let of_rounding = beside("quantisation");
+        let of_plays = !own.members_imitate()
+            && best.effects.iter().any(|o| o.mechanism.family.members_imitate())
+            && brings_little(pool, winner, i);
         let vague = own.stands_for_others()
+            || of_plays
             || of_turned_noise
             || of_rounding
             || of_a_spectrum
@@ -66,6 +70,18 @@ pub fn firmness(
         }
     }
     support
+}
+
+/// Share of the likelihood that a set gains below which a member may make up for what a sum of plays leaves of the loop.
+const LITTLE: f64 = 0.1;
+
+/// Whether a set gains most of its likelihood without a member: where the rest is a sum of a few plays, that is what their number leaves (a resonance
+/// was firm beside plays whose thresholds grow with the rate by another law).
+fn brings_little(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
+    let gained = |h: &Hypothesis<'_>| h.base.log_likelihood - pool[0].base.log_likelihood;
+    let best = &pool[winner];
+    best_that_says(pool, &best.key_without(member))
+        .is_some_and(|rest| gained(&pool[rest]) > (1.0 - LITTLE) * gained(best))
 }
 
 /// Whether a family has one member only: no sibling can be meant where that does not fit.

@@ -1,8 +1,8 @@
 //! Dry friction that grows with the transmitted load.
 
 use super::{is_there, sign};
-use crate::mechanism::{Block, Family, Law, Mechanism, Need};
-use crate::slot::Place;
+use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose};
+use crate::slot::{Place, Slot};
 
 /// Dry friction that grows with the transmitted load.
 pub static LOAD_DEPENDENT_FRICTION: Mechanism = Mechanism {
@@ -12,11 +12,16 @@ pub static LOAD_DEPENDENT_FRICTION: Mechanism = Mechanism {
     places: &[Place::Force],
     applies: |slot| slot.has("v") && slot.has("u"),
     already: &["abs(u)*sign(v)"],
-    law: |slot, _| {
-        if is_there(slot) {
-            return Law::force(format!("mu*abs(u)*{}", sign(slot))).amplitude("mu", "F/u", 0.0, 1.0);
-        }
-        Law::force("(F_c + mu*abs(u))*sign(v)").amplitude("F_c", "F", 0.0, 1.0).amplitude("mu", "F/u", 0.0, 1.0)
+    law: |slot, purpose| {
+        let loads = loads(slot, purpose);
+        let size: Vec<String> = loads.iter().map(|(mu, u)| format!("{mu}*abs({u})")).collect();
+        let size = size.join(" + ");
+        let law = if is_there(slot) {
+            Law::force(format!("({size})*{}", sign(slot)))
+        } else {
+            Law::force(format!("(F_c + {size})*sign(v)")).amplitude("F_c", "F", 0.0, 1.0)
+        };
+        loads.into_iter().fold(law, |law, (mu, u)| law.amplitude(mu, format!("F/{u}"), 0.0, 1.0))
     },
     contains: &["coulomb_friction"],
     confusable: &["coulomb_friction", "input_polynomial"],
@@ -25,3 +30,33 @@ pub static LOAD_DEPENDENT_FRICTION: Mechanism = Mechanism {
     signature: "Friction follows the envelope of the drive, not only the direction of motion.",
     reference: "P. Hamon, M. Gautier, P. Garrec, Dynamic identification of robots with a dry friction model depending on load and velocity, IROS (2010) 6187-6193",
 };
+
+/// The recorded input that loads the guide, with the name of its coefficient. Where two enter the force (a motor's torque and the load at the tool) no
+/// equation tells which of them presses: both are looked for, and each is fitted by itself.
+fn loads(slot: &Slot, purpose: Purpose) -> Vec<(&'static str, String)> {
+    match (&slot.entering()[..], purpose) {
+        ([one, other, ..], Purpose::Screening) => vec![("mu", one.clone()), ("mu_2", other.clone())],
+        ([_, other, ..], Purpose::Form(Form::Other)) => vec![("mu", other.clone())],
+        _ => vec![("mu", "u".to_owned())],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::slot::Structure;
+
+    #[test]
+    fn each_input_that_enters_the_force_may_be_the_load() {
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nT = \"temp_K\"\ntq = \"torque_Nm\"\nfa = \"axial_N\"\n[parameters]\nJ = { value = 2.0, min = 0.1 }\n\
+                    [states]\nq = { derivative = \"w\", initial = 0.0 }\nw = { derivative = \"(tq - 0.1*fa)/J\", initial = 0.0 }\n[outputs]\nq_rad = \"q + 0*T\"\n";
+        let structure = Structure::of(&Simulation::parse(text, "axis.sim.toml").unwrap());
+        let slot = structure.slots.iter().find(|s| s.place == Place::Force).unwrap();
+        let of = |purpose| loads(slot, purpose).into_iter().map(|(_, u)| u).collect::<Vec<_>>();
+        assert_eq!(of(Purpose::Screening), ["u_2", "u_3"]);
+        assert_eq!(of(Purpose::Refit), ["u"]);
+        assert_eq!(of(Purpose::Form(Form::Other)), ["u_3"]);
+    }
+}
