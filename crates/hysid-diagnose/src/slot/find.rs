@@ -28,6 +28,7 @@ impl Structure {
         slots.extend(finder.forces());
         slots.extend(finder.connections());
         slots.extend(finder.force_laws());
+        slots.extend(finder.core_laws());
         slots.extend(finder.own_loops());
         slots.extend(finder.stores());
         slots.extend(finder.sensors());
@@ -52,7 +53,7 @@ impl Structure {
 }
 
 /// Whether a unit measures the same as one of these.
-fn is_one_of(unit: &Unit, names: &[&str]) -> bool {
+pub(super) fn is_one_of(unit: &Unit, names: &[&str]) -> bool {
     names.iter().filter_map(|name| Unit::parse(name).ok()).any(|u| u.same_dimension(unit))
 }
 
@@ -64,7 +65,7 @@ pub(super) struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    fn unit_of_output(&self, column: &str, expression: &Expr) -> Option<Unit> {
+    pub(super) fn unit_of_output(&self, column: &str, expression: &Expr) -> Option<Unit> {
         Unit::of_column(column).or_else(|| self.simulation.unit_of_expr(expression))
     }
 

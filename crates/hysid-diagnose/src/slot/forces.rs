@@ -1,9 +1,9 @@
 //! The slots at which forces stand: on a moving part, at the output of a static force law.
 
-use hysid_plant::Expr;
+use hysid_plant::{Expr, Output, State, Unit};
 
 use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, quotient, size};
-use super::find::Finder;
+use super::find::{Finder, is_one_of};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
 use super::{Place, Pull, Slot, Target};
 
@@ -108,13 +108,7 @@ impl Finder<'_> {
                     (None, Some(x)) => Expr::symbol(x).derivative_of_input(),
                     (None, None) => continue,
                 };
-                let mut slot = Slot::new(
-                    Place::ForceLaw,
-                    format!("output:{}", output.column),
-                    format!("in {}", output.column),
-                    Target::Output(output.column.clone()),
-                );
-                slot.loops = self.loops(&v);
+                let mut slot = self.force_law(output, x, v.clone());
                 if let Some(control) = self.control(&output.expression, &v) {
                     slot.offer(self.simulation, "control", control);
                 }
@@ -123,30 +117,60 @@ impl Finder<'_> {
                 {
                     slot.offer(self.simulation, "c", c);
                 }
-                slot.offer(self.simulation, "v", v);
-                if let Some(x) = x {
-                    slot.offer(self.simulation, "x", Expr::symbol(x));
-                    if let Some(k) = linear_coefficient(self.simulation, &output.expression, x) {
-                        slot.offer(self.simulation, "k", k);
-                    }
-                    if let Some(rad) = self.simulation.unit_of(x).as_ref().and_then(angle) {
-                        slot.offer(self.simulation, "rad", rad);
-                    }
-                }
-                slot.offer(self.simulation, "F", output.expression.clone());
-                self.name_unit(&mut slot, "F", &output.column);
-                slot.context = self.equations();
-                slot.offer_own_sign(self.simulation);
-                slot.constant = has_free_constant(self.simulation, &output.expression);
                 slots.push(slot);
             }
         }
         slots
     }
+
+    /// The laws by which windings draw current: over the flux linkage as a force over a displacement, whose velocity is the voltage. The current of the
+    /// law is not fed back to the voltage across the winding's resistance, which a measured core makes small.
+    pub(super) fn core_laws(&self) -> Vec<Slot> {
+        let has_unit = |unit: Option<Unit>, wanted: &str| unit.is_some_and(|u| is_one_of(&u, &[wanted]));
+        let flux = |s: &&State| has_unit(self.simulation.unit_of(&s.name), "Wb") && self.original.state(&s.name).is_some();
+        let fluxes: Vec<&State> = self.simulation.states.iter().filter(flux).collect();
+        let currents = self.simulation.outputs.iter();
+        let currents = currents.filter(|o| has_unit(self.unit_of_output(&o.column, &o.expression), "A"));
+        currents
+            .flat_map(|o| fluxes.iter().filter(|s| o.expression.uses(&s.name)).map(move |s| (o, *s)))
+            .map(|(o, s)| self.force_law(o, Some(&s.name), s.derivative.clone()))
+            .collect()
+    }
+
+    /// The slot of a law that gives an output over a displacement and its velocity.
+    fn force_law(&self, output: &Output, x: Option<&str>, v: Expr) -> Slot {
+        let simulation = self.simulation;
+        let mut slot = Slot::new(
+            Place::ForceLaw,
+            format!("output:{}", output.column),
+            format!("in {}", output.column),
+            Target::Output(output.column.clone()),
+        );
+        slot.loops = self.loops(&v);
+        slot.offer(simulation, "v", v);
+        if let Some(x) = x {
+            slot.offer(simulation, "x", Expr::symbol(x));
+            if let Some(k) = linear_coefficient(simulation, &output.expression, x) {
+                slot.offer(simulation, "k", k);
+            }
+            if let Some(rad) = simulation.unit_of(x).as_ref().and_then(angle) {
+                slot.offer(simulation, "rad", rad);
+            }
+        }
+        slot.offer(simulation, "F", output.expression.clone());
+        self.name_unit(&mut slot, "F", &output.column);
+        slot.context = self.equations();
+        slot.offer_own_sign(simulation);
+        slot.constant = has_free_constant(simulation, &output.expression);
+        slot
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use hysid_plant::Simulation;
+
+    use super::super::Structure;
     use super::super::connections::tests::slots;
     use super::*;
 
@@ -170,5 +194,21 @@ mod tests {
         let found = slots(Place::Force, &chain);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0][..2], ["y", "w1"]);
+    }
+
+    #[test]
+    fn a_core_draws_its_current_over_the_flux_as_a_spring_its_force_over_the_displacement() {
+        let of = |unit: &str, column: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 1e-4\n[inputs]\ne = \"primary_V\"\n[parameters]\nR = {{ value = 2.0, min = 0.1, unit = \"ohm\" }}\nL = {{ value = 0.5, min = 0.1, unit = \"H\" }}\n\
+                 [states]\nlam = {{ derivative = \"e - R*lam/L\", initial = 0.0, unit = \"{unit}\" }}\n[outputs]\n{column} = \"lam/L\"\n"
+            );
+            let simulation = Simulation::parse(&text, "core.sim.toml").unwrap();
+            let slots = Structure::of(&simulation).slots.into_iter();
+            let laws = slots.filter(|s| s.place == Place::ForceLaw);
+            laws.map(|s| ["x", "v", "k"].map(|q| s.quantity(q).unwrap().expression.to_string())).collect::<Vec<_>>()
+        };
+        assert_eq!(of("Wb", "primary_A"), [["lam", "e - R*lam/L", "1/L"].map(str::to_owned)]);
+        assert_eq!(of("V s", "primary_mA").len(), 1);
     }
 }
