@@ -230,7 +230,7 @@ impl Finder<'_> {
         }
     }
 
-    /// The current that a parameter resists, as `R` in `(u - R*i)/L`.
+    /// The current that a parameter resists, as `R` in `(u - R*i)/L`; of a recorded one, as `R` in `e - R*i`.
     fn current_through(&self, parameter: &str) -> Option<&str> {
         let resists = |s: &&State| {
             let (voltage, inductance) = force_of(self.simulation, &s.derivative);
@@ -238,7 +238,14 @@ impl Finder<'_> {
                 && linear_coefficient(self.simulation, voltage, &s.name).is_some_and(|c| c.uses(parameter))
                 && !inductance.is_some_and(|l| l.uses(parameter))
         };
-        self.simulation.states.iter().find(resists).map(|s| s.name.as_str())
+        let recorded = |symbol: &&str| {
+            let through = |e: &Expr| {
+                linear_coefficient(self.simulation, force_of(self.simulation, e).0, symbol).is_some_and(|c| c.uses(parameter))
+            };
+            self.simulation.unit_of(symbol).is_some_and(|u| is_one_of(&u, &["A"])) && self.equations().iter().any(through)
+        };
+        let state = self.simulation.states.iter().find(resists).map(|s| s.name.as_str());
+        state.or_else(|| self.simulation.inputs.iter().map(|i| i.symbol.as_str()).find(recorded))
     }
 
     /// The current of a winding that an input drives, and the motion that it moves; `None` where the winding feels the speed already.

@@ -256,6 +256,13 @@ fn heat_follows_the_power_that_is_dissipated() {
     };
     assert_eq!(heat(Purpose::Refit), "((1 + beta*theta)*i^2 - theta)/tau_h");
     assert_eq!(heat(Purpose::Form(Form::Other)), "((1 + beta*theta)*abs(i) - theta)/tau_h");
+    // A recorded current heats what it passes through.
+    let cell = "[time]\nperiod_s = 1.0\n[inputs]\ni = \"current_A\"\n[parameters]\ne0 = { value = 4.0, min = 0.1, unit = \"V\" }\nR0 = { value = 0.05, min = 0.01, unit = \"ohm\" }\n\
+                R1 = { value = 0.02, min = 0.01, unit = \"ohm\" }\ntau = { value = 30.0, min = 1.0, unit = \"s\" }\n[states]\nv1 = { derivative = \"(i*R1 - v1)/tau\", initial = 0.0, unit = \"V\" }\n\
+                [outputs]\ncell_V = \"e0 - R0*i - v1\"\n";
+    let cell = Simulation::parse(cell, "cell.sim.toml").unwrap();
+    let resistors: Vec<String> = heating.slots(&Structure::of(&cell)).into_iter().map(|s| s.label).collect();
+    assert_eq!(resistors, ["parameter:R0", "parameter:R1"]);
 }
 
 /// Where another store is fed through the opening a loss along Torricelli's law is one of its own.
