@@ -240,9 +240,11 @@ impl Finder<'_> {
         };
         let recorded = |symbol: &&str| {
             let through = |e: &Expr| {
-                linear_coefficient(self.simulation, force_of(self.simulation, e).0, symbol).is_some_and(|c| c.uses(parameter))
+                linear_coefficient(self.simulation, force_of(self.simulation, e).0, symbol)
+                    .is_some_and(|c| c.uses(parameter))
             };
-            self.simulation.unit_of(symbol).is_some_and(|u| is_one_of(&u, &["A"])) && self.equations().iter().any(through)
+            self.simulation.unit_of(symbol).is_some_and(|u| is_one_of(&u, &["A"]))
+                && self.equations().iter().any(through)
         };
         let state = self.simulation.states.iter().find(resists).map(|s| s.name.as_str());
         state.or_else(|| self.simulation.inputs.iter().map(|i| i.symbol.as_str()).find(recorded))

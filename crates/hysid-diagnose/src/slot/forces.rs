@@ -127,7 +127,8 @@ impl Finder<'_> {
     /// law is not fed back to the voltage across the winding's resistance, which a measured core makes small.
     pub(super) fn core_laws(&self) -> Vec<Slot> {
         let has_unit = |unit: Option<Unit>, wanted: &str| unit.is_some_and(|u| is_one_of(&u, &[wanted]));
-        let flux = |s: &&State| has_unit(self.simulation.unit_of(&s.name), "Wb") && self.original.state(&s.name).is_some();
+        let flux =
+            |s: &&State| has_unit(self.simulation.unit_of(&s.name), "Wb") && self.original.state(&s.name).is_some();
         let fluxes: Vec<&State> = self.simulation.states.iter().filter(flux).collect();
         let currents = self.simulation.outputs.iter();
         let currents = currents.filter(|o| has_unit(self.unit_of_output(&o.column, &o.expression), "A"));

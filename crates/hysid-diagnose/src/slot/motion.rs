@@ -136,9 +136,9 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
             continue;
         }
         // A chain x' = v, v' = a, a' = ...: what acts on a depends on where and how fast the part is; v is no displacement.
-        let first = position.filter(|_| scale.is_none()).and_then(|v| {
-            known().find(|x| x.derivative == Expr::symbol(&v.name)).map(|x| (x, v))
-        });
+        let first = position
+            .filter(|_| scale.is_none())
+            .and_then(|v| known().find(|x| x.derivative == Expr::symbol(&v.name)).map(|x| (x, v)));
         let (x, v) = first.map_or((position, velocity), |(x, v)| (Some(x), v));
         found.push(Motion {
             x: x.map(|s| s.name.as_str()),
