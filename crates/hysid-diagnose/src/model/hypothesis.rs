@@ -184,7 +184,7 @@ impl<'d> Setting<'d> {
 
 /// For tests: a recording of an input and an output, as data of a simulation.
 #[cfg(test)]
-pub fn recorded(simulation: &Simulation, period_s: f64, columns: [(&str, Vec<f64>); 2]) -> DataSet {
+pub fn recorded<const N: usize>(simulation: &Simulation, period_s: f64, columns: [(&str, Vec<f64>); N]) -> DataSet {
     use hysid_signal::{Channel, Clock, Recording};
     let channels = columns.map(|(name, samples)| Channel { name: name.into(), samples }).into();
     let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s }, channels).unwrap();
