@@ -90,9 +90,12 @@ pub fn best_place(sets: &[(Key, f64)], key: &Key) -> Option<usize> {
     (0..sets.len()).filter(|&i| sets[i].0 == *key).max_by(|&a, &b| sets[a].1.total_cmp(&sets[b].1))
 }
 
-/// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest: log likelihood of the blocks, each row for
+/// How well a hypothesis predicts blocks that it was not fitted to: log likelihood of the blocks, each row for
 /// the share that it has in the fit, and each row's square (in units of its output's scale) for the standard error of a difference.
-pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<(f64, Vec<f64>)> {
+pub type OnBlocks = (f64, Vec<f64>);
+
+/// How well a hypothesis predicts blocks of the estimation recordings when it is fitted to the rest.
+pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<OnBlocks> {
     let data = setting.data;
     let weights = held_out_blocks(&data.layout, &data.y);
     let options = LmOptions { iterations: 5, ..LmOptions::default() };

@@ -3,7 +3,7 @@
 use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights, stretched};
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::mechanism::{Family, catalogue};
-use crate::model::hypothesis::{Hypothesis, best_that_says};
+use crate::model::hypothesis::{Hypothesis, OnBlocks, best_that_says};
 
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
@@ -15,7 +15,7 @@ const REFUTED_BUT_FOR_THE_START: f64 = 60.0;
 pub fn likelihoods(
     pool: &[Hypothesis<'_>],
     weighed: &[Weighed],
-    blocks: &[Option<(f64, Vec<f64>)>],
+    blocks: &[Option<OnBlocks>],
     winner: usize,
     imperfect: bool,
 ) -> Vec<f64> {

@@ -7,11 +7,8 @@
 use crate::data::held_out_blocks;
 use crate::evidence::{difference, norm2};
 use crate::model::base::Base;
-use crate::model::hypothesis::Hypothesis;
+use crate::model::hypothesis::{Hypothesis, OnBlocks};
 use crate::search::leaves_more;
-
-/// The score and the squared errors of a set on blocks that it was not fitted to.
-pub type OnBlocks = Option<(f64, Vec<f64>)>;
 
 /// Share of the log likelihood that a set must gain under the noise of the simulation as it is for its effects to explain.
 const EXPLAINED: f64 = 0.5;
@@ -24,13 +21,13 @@ pub fn veto(
     none: &Hypothesis<'_>,
     least: &Hypothesis<'_>,
     best: &Hypothesis<'_>,
-    blocks: [&OnBlocks; 2],
+    blocks: [&Option<OnBlocks>; 2],
 ) -> Option<&'static str> {
     let driven = none.base.driven() && best.base.driven();
     let [before, after] = blocks.map(Option::as_ref);
     let worse = before.zip(after).is_some_and(|(b, a)| if driven { a.0 < b.0 } else { is_worse(&a.1, &b.1) });
-    let mut amplitudes = best.effects.iter().flat_map(|e| &e.written.amplitudes);
-    if worse && amplitudes.all(|a| told_outside_blocks(&best.base, &a.name)) {
+    let amplitudes = best.effects.iter().flat_map(|e| &e.written.amplitudes).map(|a| a.name.as_str());
+    if worse && told_outside_blocks(&best.base, amplitudes) {
         Some(
             "the best set of effects predicts held-out blocks of the recordings no better than the simulation as it is: it is no improvement outside the data it was fitted to",
         )
@@ -55,16 +52,17 @@ fn explains(none: &Base<'_>, best: &Hypothesis<'_>) -> bool {
         > EXPLAINED * (best.base.log_likelihood - none.log_likelihood)
 }
 
-/// Whether what is not held out tells of an amplitude: a store that overflows once does so in a block or out of all.
-fn told_outside_blocks(base: &Base<'_>, amplitude: &str) -> bool {
-    let Some(place) = base.model.place_of(amplitude) else { return true };
+/// Whether what is not held out tells of each of these amplitudes: a store that overflows once does so in a block or out of all.
+fn told_outside_blocks<'n>(base: &Base<'_>, amplitudes: impl Iterator<Item = &'n str>) -> bool {
     let data = base.model.data();
     let weights = held_out_blocks(&data.layout, &data.y);
-    let [all, rest] = [None, Some(&weights[..])].map(|weights| {
-        base.fit.covariance(&data.layout, &base.whitener, weights, 1.0)[place * (base.fit.theta.len() + 1)]
-    });
-    // An amplitude at a bound has no variance, one of which the rest tells nothing has none there.
-    all <= 0.0 || (rest > 0.0 && all > TOLD * rest)
+    let [all, rest] =
+        [None, Some(&weights[..])].map(|weights| base.fit.covariance(&data.layout, &base.whitener, weights, 1.0));
+    amplitudes.filter_map(|name| base.model.place_of(name)).all(|place| {
+        let [all, rest] = [&all, &rest].map(|of| of[place * (base.fit.theta.len() + 1)]);
+        // An amplitude at a bound has no variance, one of which the rest tells nothing has none there.
+        all <= 0.0 || (rest > 0.0 && all > TOLD * rest)
+    })
 }
 
 #[cfg(test)]
@@ -90,7 +88,7 @@ mod tests {
             let data = recorded(&simulation, 0.1, [("u_V", u.clone()), ("w_V", w), ("y_V", y)]);
             let budget = Budget::new(&|_| false);
             let (_, none) = calibrated(simulation.clone(), &data, NoiseKind::White(1.0), &budget);
-            ["a", "b"].map(|name| told_outside_blocks(&none.base, name))
+            ["a", "b"].map(|name| told_outside_blocks(&none.base, std::iter::once(name)))
         };
         // The third tenth is held out, the second is not.
         assert_eq!(told(120), [true, false]);

@@ -8,7 +8,7 @@ use super::wordings::{collapses, shared, wordings};
 use super::{Claim, FIRM, Hypothesis as Weighed, probabilities};
 use crate::budget::Step;
 use crate::model::base::Base;
-use crate::model::hypothesis::{Effect, Hypothesis, Setting, block_score};
+use crate::model::hypothesis::{Effect, Hypothesis, OnBlocks, Setting, block_score};
 use crate::search::compose::best_of;
 use crate::search::leaves_more;
 
@@ -78,7 +78,7 @@ pub fn settled(winner: f64, rival: f64, separation: Option<f64>) -> bool {
 }
 
 /// Scores on held-out blocks of the hypotheses that are close to the best; `None` for the others.
-pub fn block_scores(setting: &Setting<'_>, pool: &[Hypothesis<'_>]) -> Vec<Option<(f64, Vec<f64>)>> {
+pub fn block_scores(setting: &Setting<'_>, pool: &[Hypothesis<'_>]) -> Vec<Option<OnBlocks>> {
     let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     let mut near: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].log_evidence > top - 8.0).collect();
     near.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
@@ -115,12 +115,7 @@ const TIE: f64 = 3.0;
 
 /// The standing set, or one of its size that ties in evidence and predicts the held-out blocks better; of those that tie, the best whose families are the
 /// likeliest by all that was fitted: what is told first must not be what the alternatives outweigh.
-pub fn tie_broken(
-    pool: &[Hypothesis<'_>],
-    weighed: &[Weighed],
-    standing: usize,
-    blocks: &[Option<(f64, Vec<f64>)>],
-) -> usize {
+pub fn tie_broken(pool: &[Hypothesis<'_>], weighed: &[Weighed], standing: usize, blocks: &[Option<OnBlocks>]) -> usize {
     let score = |i: usize| blocks[i].as_ref().map_or(f64::NEG_INFINITY, |b| b.0);
     let tying: Vec<usize> = (0..pool.len())
         .filter(|&i| {
@@ -225,7 +220,7 @@ fn overpriced(general: &Hypothesis<'_>, special: &Hypothesis<'_>) -> f64 {
 pub fn log_weights(
     pool: &[Hypothesis<'_>],
     weighed: &[Weighed],
-    blocks: &[Option<(f64, Vec<f64>)>],
+    blocks: &[Option<OnBlocks>],
     winner: usize,
     weight: f64,
 ) -> Vec<f64> {
