@@ -290,8 +290,8 @@ fn write_law(
                 let (searched, places) = (parameter.searched, Places::of(grid));
                 let from = parameter.told_from.as_ref();
                 let told_from = from.and_then(|(measure, times, below)| Some((multiple(*times, measure)?, *below)));
-                let pointed = signals.pointed(grid).to_vec();
-                shapes.push(Shape { name: name.clone(), grid: values, pointed, searched, places, told_from });
+                let (pointed, over) = (signals.pointed(grid).to_vec(), signals.over(grid));
+                shapes.push(Shape { name: name.clone(), grid: values, pointed, searched, places, over, told_from });
             }
             Role::Constant(grid) => {
                 new.value = signals.values(grid, size).first().copied().unwrap_or(size);

@@ -4,6 +4,9 @@ use hysid_plant::{Expr, Simulation, Unit};
 
 use super::{Grid, Purpose};
 
+/// Lines that lie within the spacing of a shape that is one: a fit from any of them may have ended in the minimum of another.
+const LOBES: f64 = 3.0;
+
 /// A parameter whose zero is the baseline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Amplitude {
@@ -26,8 +29,24 @@ pub struct Shape {
     pub searched: bool,
     /// What of the recording the values were taken from.
     pub places: Places,
+    /// That over which lines are told from each other: the recording's duration for frequencies, the travel for periods of the position.
+    pub over: f64,
     /// The value below which the law looks like one of another kind on this recording, and that kind in words.
     pub told_from: Option<(f64, &'static str)>,
+}
+
+impl Shape {
+    /// How far a value may be from the next that the recording tells from it: between two lines a whole cycle more or less, else the spacing of the grid.
+    pub fn spacing(&self, value: f64) -> f64 {
+        let lines = match self.places {
+            Places::Lines => 1.0 / self.over,
+            Places::Turns => value * value / self.over,
+            Places::Any | Places::Moments => 0.0,
+        };
+        let above = self.grid.partition_point(|g| *g <= value).clamp(1, self.grid.len().max(2) - 1);
+        let of_grid = || self.grid.get(above).zip(self.grid.get(above - 1)).map_or(0.0, |(high, low)| high - low);
+        if lines > 0.0 && lines.is_finite() { LOBES * lines } else { of_grid() }
+    }
 }
 
 /// What of a recording the values of a shape point to: an effect that is looked for at many places is found at one of them by chance.

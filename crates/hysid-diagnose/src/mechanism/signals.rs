@@ -183,6 +183,11 @@ impl Signals {
         if matches!(grid, Grid::Turns(..)) { &self.periods } else { &[] }
     }
 
+    /// What lines are resolved over: the travel of the signal of turns, else the recording's duration.
+    pub(super) fn over(&self, grid: &Grid) -> f64 {
+        if let Grid::Turns(symbol, _) = grid { 2.0 * self.reach(symbol) } else { self.duration_s() }
+    }
+
     /// Bounds for a parameter whose law states none.
     pub(super) fn bounds(&self, grid: &Grid, values: &[f64]) -> (f64, f64) {
         let (low, high) = match (values.first(), values.last()) {

@@ -7,24 +7,26 @@ use rayon::prelude::*;
 use super::finer::finer;
 use super::finish::finish;
 use super::screen::{Candidate, with_added_starts};
-use super::starts::{set, starting_values, starts};
+use super::starts::{set, starting_values, starts, strength_in_shapes};
 use crate::budget::Step;
 use crate::model::Values;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
-/// A few iterations from a candidate's best start, the first of `froms`; from the last two as well (the user's own parameters and a global
-/// calibration) where the fit without the effect is far off.
+/// A few iterations from a candidate's best start, the first of `froms`; from the second as well where the law's strength is in its shapes (at the points
+/// of the grid it may be far too strong), and from the last two (the user's own parameters and a global calibration) where the fit without the effect is
+/// far off.
 fn sketch<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'_>,
     candidate: &Candidate,
     froms: &[Values],
 ) -> Option<Base<'d>> {
+    let first = 1 + usize::from(strength_in_shapes(candidate));
     froms
         .iter()
         .enumerate()
-        .filter(|(i, _)| *i == 0 || (*i + 2 >= froms.len() && parent.base.far()))
+        .filter(|(i, _)| *i < first || (*i + 2 >= froms.len() && parent.base.far()))
         .filter_map(|(_, from)| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, 3))
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }

@@ -15,7 +15,7 @@ use crate::model::Model;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Setting};
 
-/// Values on either side of where the shape stands, over one spacing of its grid.
+/// Values on either side of where the shape stands, over one spacing.
 const ASIDE: usize = 12;
 /// Scans, each over the two nearest values of the one before.
 const SCANS: usize = 4;
@@ -56,7 +56,7 @@ fn lowest(setting: &Setting<'_>, base: &Base<'_>, shape: &Shape) -> Vec<f64> {
     let Some(error) = Profile::of(setting, base, shape) else { return Vec::new() };
     let here = error.here;
     let Some(&now) = error.at(&[here]).first() else { return Vec::new() };
-    let step = spacing(&shape.grid, here) / ASIDE as f64;
+    let step = shape.spacing(here) / ASIDE as f64;
     let scanned = error.around(here, step, ASIDE);
     let is_least = |i: usize| {
         let neighbour = |j: Option<usize>| j.and_then(|j| scanned.get(j)).map_or(f64::INFINITY, |s: &(f64, f64)| s.1);
@@ -75,12 +75,6 @@ fn lowest(setting: &Setting<'_>, base: &Base<'_>, shape: &Shape) -> Vec<f64> {
         least
     });
     finer.filter(|least| least.1 < now).map(|least| least.0).collect()
-}
-
-/// The spacing of a grid in ascending order where a value stands.
-fn spacing(grid: &[f64], value: f64) -> f64 {
-    let above = grid.partition_point(|g| *g <= value).clamp(1, grid.len() - 1);
-    grid[above] - grid[above - 1]
 }
 
 /// The error of a fit as a function of one shape.
@@ -171,7 +165,7 @@ mod tests {
             let h = refit(setting, none, candidate).unwrap();
             let shape = &h.effects[0].written.shapes[0];
             let profile = Profile::of(setting, &h.base, shape).unwrap();
-            let step = 0.03 * spacing(&shape.grid, profile.here);
+            let step = 0.03 * shape.spacing(profile.here);
             for value in [profile.here, profile.here - step, profile.here + step] {
                 let mut held = h.base.model.simulation().clone();
                 held.parameter_mut(&shape.name).unwrap().fixed = true;
@@ -192,7 +186,7 @@ mod tests {
         with_a_knee(knee, |setting, none, candidate| {
             let mut h = refit(setting, none, candidate).unwrap();
             let shape = h.effects[0].written.shapes[0].clone();
-            let away = knee - 0.8 * spacing(&shape.grid, knee);
+            let away = knee - 0.8 * shape.spacing(knee);
             let mut from: Values = h.base.values();
             from.parameters.insert(shape.name.clone(), away);
             h.base = setting.fit(h.base.model.simulation(), &from, None, 1, 0).unwrap();

@@ -13,7 +13,8 @@ use crate::model::hypothesis::{Hypothesis, Setting};
 /// Points of a shape grid that a refit starts from.
 const MOST_POINTS: usize = 3;
 
-/// Starts of a refit: the best points of the grid that are no neighbours of each other, and the gentlest.
+/// Starts of a refit: the best point of the grid, as strong as the screening would have it where its strength is in its shapes, the next best points that
+/// are no neighbours of each other, and gentler ones.
 pub fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
     let named = |point: &Point| -> Vec<(String, f64)> {
         let mut values = point.shapes.clone();
@@ -25,6 +26,8 @@ pub fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
     let mut out: Vec<Vec<(String, f64)>> = Vec::new();
     let Some(best) = candidate.points.first() else { return out };
     out.push(named(best));
+    let weight = best.amplitudes.first().map_or(1.0, |a| a.1);
+    out.extend(weakened(candidate, &best.shapes, weight));
     let far = |a: &[(String, f64)], b: &[(String, f64)]| {
         a.iter().zip(b).any(|((_, x), (_, y))| (x - y).abs() > 0.6 * x.abs().max(y.abs()))
     };
@@ -45,23 +48,25 @@ pub fn starts(candidate: &Candidate) -> Vec<Vec<(String, f64)>> {
         turned.iter_mut().filter(|(name, _)| *name == last.name).for_each(|(_, value)| *value = -*value);
         out.push(turned);
     }
-    let weight = best.amplitudes.first().map_or(1.0, |a| a.1);
-    out.extend(
-        [weight.clamp(0.05, 1.0).sqrt(), weight].into_iter().filter_map(|w| weakened(candidate, &best.shapes, w)),
-    );
+    out.extend(weakened(candidate, &best.shapes, weight.clamp(0.05, 1.0).sqrt()));
     out
 }
 
 /// Least share of a shape's way from its neutral value that a weak effect begins at.
 const WEAKEST: f64 = 0.01;
 
+/// Whether a law has no amplitude and its strength is in its shapes.
+pub fn strength_in_shapes(candidate: &Candidate) -> bool {
+    candidate.refit.amplitudes.is_empty() && !candidate.refit.neutral.is_empty()
+}
+
 /// Shapes of a law that has no amplitude, so that its strength is in them, at a share of their way from where the law does nothing; `None` for other
 /// laws.
 pub fn weakened(candidate: &Candidate, shapes: &[(String, f64)], share: f64) -> Option<Vec<(String, f64)>> {
-    let neutral = &candidate.refit.neutral;
-    if !candidate.refit.amplitudes.is_empty() || neutral.is_empty() {
+    if !strength_in_shapes(candidate) {
         return None;
     }
+    let neutral = &candidate.refit.neutral;
     let neutral = |name: &str| neutral.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
     let share = share.clamp(WEAKEST, 1.0);
     Some(shapes.iter().map(|(n, v)| (n.clone(), neutral(n) + share * (v - neutral(n)))).collect())
