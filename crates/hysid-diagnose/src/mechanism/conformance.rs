@@ -42,7 +42,8 @@ specimens!(
     "shaker",
     "shaft",
     "stage",
-    "brace"
+    "brace",
+    "bearing"
 );
 
 /// A breach of the suite's laws.
@@ -215,6 +216,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.01, 1.0),
     (0.01, 4.0),
     (0.002, 20.0),
+    (0.002, 4.0),
 ];
 
 /// A bench for each specimen.

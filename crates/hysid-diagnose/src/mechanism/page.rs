@@ -49,6 +49,7 @@ fn place_name(place: Place) -> &'static str {
     match place {
         Place::Input => "input",
         Place::Between => "inside a cascade",
+        Place::Command => "command of a controller",
         Place::Force => "force on a moving part",
         Place::Connection => "force between two parts",
         Place::ForceLaw => "static force law",

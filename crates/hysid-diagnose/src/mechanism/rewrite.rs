@@ -120,6 +120,14 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             }
             Ok(())
         }
+        (Target::PartIn(part, states), Change::Replace(text)) => {
+            let by = writer.text(text)?;
+            for name in states {
+                let state = simulation.state_mut(name).ok_or("the state is gone")?;
+                state.derivative = state.derivative.replace(part, &by);
+            }
+            Ok(())
+        }
         (Target::Output(column), Change::Replace(text)) => {
             let by = writer.text(text)?;
             let output = simulation.output_mut(column).ok_or("the output is gone")?;

@@ -25,6 +25,7 @@ impl Structure {
         let mut slots = Vec::new();
         slots.extend(finder.inputs());
         slots.extend(finder.cascades());
+        slots.extend(finder.commands());
         slots.extend(finder.forces());
         slots.extend(finder.connections());
         slots.extend(finder.force_laws());

@@ -12,6 +12,7 @@
 //! of several states, the sum is.
 
 mod algebra;
+mod commands;
 mod connections;
 mod find;
 mod forces;
@@ -43,6 +44,8 @@ pub enum Place {
     Input,
     /// Inside a cascade: what one part passes on to the next, without anything coming back.
     Between,
+    /// What a controller inside the simulation puts out.
+    Command,
     /// The force on a moving part, against the ground.
     Force,
     /// The force between two moving parts.
@@ -73,6 +76,8 @@ pub(crate) enum Target {
     /// Replaces this symbol in the derivatives of these states. Where the signal is a sum, the expression is what it holds besides the
     /// symbol.
     SymbolIn(String, Vec<String>, Option<Expr>),
+    /// Replaces this part of the derivatives of these states.
+    PartIn(Expr, Vec<String>),
 }
 
 /// A state whose derivative a force changes, and how.

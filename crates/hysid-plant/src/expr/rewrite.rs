@@ -42,6 +42,11 @@ impl Expr {
         })
     }
 
+    /// The expression with every occurrence of `part`, as it is written, replaced by `by`.
+    pub fn replace(&self, part: &Expr, by: &Expr) -> Expr {
+        self.map(&mut |e| if e == *part { by.clone() } else { e })
+    }
+
     /// The symbols used, in alphabetical order, `t` and `pi` among them.
     pub fn symbols(&self) -> BTreeSet<String> {
         let mut found = BTreeSet::new();

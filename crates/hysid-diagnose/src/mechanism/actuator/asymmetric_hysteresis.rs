@@ -9,7 +9,7 @@ pub static ASYMMETRIC_HYSTERESIS: Mechanism = Mechanism {
     id: "asymmetric_hysteresis",
     family: Family::ActuatorHysteresis,
     block: Block::Hysteresis,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Command],
     applies: anywhere,
     already: &["play(u, R)", "play(u + P, R)", "max(Z - P, 0)"],
     law: |_, purpose| {

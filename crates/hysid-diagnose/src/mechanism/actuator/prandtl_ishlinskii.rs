@@ -9,7 +9,7 @@ pub static PRANDTL_ISHLINSKII: Mechanism = Mechanism {
     id: "prandtl_ishlinskii",
     family: Family::ActuatorHysteresis,
     block: Block::Hysteresis,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Command],
     applies: anywhere,
     already: &["play(u, R)", "play(u + P, R)"],
     law: |_, purpose| {

@@ -17,7 +17,7 @@ pub static PREISACH: Mechanism = Mechanism {
     id: "preisach",
     family: Family::ActuatorHysteresis,
     block: Block::Hysteresis,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Command],
     applies: anywhere,
     already: &["play(u, R)", "play(u + P, R)", "relay(u, P, Q)"],
     law: |_, purpose| {

@@ -123,6 +123,7 @@ fn a_mechanism_is_recovered_from_its_own_simulation() {
     check("Hydraulic", "leakage");
     check("Shaker", "back_emf");
     check("Stalling", "stall_lag");
+    check("Magnetic bearing", "dead_zone");
     // Between the two filters.
     check_at("Circuit", "input_saturation", 1);
 }

@@ -8,7 +8,7 @@ pub static INPUT_POLYNOMIAL: Mechanism = Mechanism {
     id: "input_polynomial",
     family: Family::InputNonlinearity,
     block: Block::Input,
-    places: &[Place::Input, Place::Between],
+    places: &[Place::Input, Place::Between, Place::Command],
     applies: anywhere,
     already: &["u^2", "u^3", "u*u", "u*abs(u)"],
     law: |_, purpose| {

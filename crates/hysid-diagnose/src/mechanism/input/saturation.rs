@@ -8,7 +8,7 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     id: "input_saturation",
     family: Family::InputNonlinearity,
     block: Block::Input,
-    places: &[Place::Input, Place::Between],
+    places: &[Place::Input, Place::Between, Place::Command],
     applies: anywhere,
     already: &["max(min(u, P), Q)", "min(max(u, P), Q)", "u - P*max(u - Q, 0)"],
     law: |slot, purpose| {

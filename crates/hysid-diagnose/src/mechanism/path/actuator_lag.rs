@@ -9,7 +9,7 @@ pub static ACTUATOR_LAG: Mechanism = Mechanism {
     id: "actuator_lag",
     family: Family::SignalPathLag,
     block: Block::Input,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Command],
     applies: anywhere,
     already: &["lag(u, P)", "lag(y, P)"],
     law: |slot, purpose| {

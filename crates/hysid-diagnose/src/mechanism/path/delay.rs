@@ -8,7 +8,7 @@ pub static DELAY: Mechanism = Mechanism {
     id: "delay",
     family: Family::SignalPathLag,
     block: Block::Input,
-    places: &[Place::Input, Place::Sensor],
+    places: &[Place::Input, Place::Command, Place::Sensor],
     applies: anywhere,
     already: &["delay(u, P)", "delay(y, P)"],
     law: |slot, purpose| {

@@ -10,12 +10,12 @@ pub static BACKLASH: Mechanism = Mechanism {
     id: "backlash",
     family: Family::Play,
     block: Block::Hysteresis,
-    places: &[Place::Input, Place::Between, Place::Sensor, Place::Connection],
+    places: &[Place::Input, Place::Between, Place::Command, Place::Sensor, Place::Connection],
     applies: |slot| slot.place != Place::Connection || slot.has("k"),
     already: &["play(u, R)", "play(u + P, R)", "play(y, R)", "max(min(x, P), Q)"],
     law: |slot, purpose| {
         let signal = match slot.place {
-            Place::Input | Place::Between => "u",
+            Place::Input | Place::Between | Place::Command => "u",
             Place::Sensor => "y",
             // Between two masses the dead-zone form: no force inside the gap of the coupling.
             _ => {

@@ -1,0 +1,144 @@
+//! The commands of loops that the simulation closes: what a controller in its equations puts out, as `j - kp*x - kd*v` in
+//! `(ks*x + ki*(j - kp*x - kd*v))/m`. What an actuator leaves out acts on the whole of it, the fed-back part too.
+
+use hysid_plant::{BinaryOp, Expr, Simulation};
+
+use super::algebra::only_parameters;
+use super::find::Finder;
+use super::motion::{Kinematic, force_of, kinematic};
+use super::{Place, Slot, Target};
+
+impl Finder<'_> {
+    /// One slot for each command, whichever states it drives.
+    pub(super) fn commands(&self) -> Vec<Slot> {
+        let known = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some());
+        let mut found: Vec<(Expr, Vec<String>)> = Vec::new();
+        for state in known {
+            for command in commands_in(self.simulation, &state.derivative) {
+                match found.iter_mut().find(|(e, _)| *e == *command) {
+                    Some((_, driven)) => driven.push(state.name.clone()),
+                    None => found.push((command.clone(), vec![state.name.clone()])),
+                }
+            }
+        }
+        let slot = |(command, driven): (Expr, Vec<String>)| {
+            let first = driven.first()?;
+            let mut slot = Slot::new(
+                Place::Command,
+                format!("state:{first}"),
+                format!("where the command {command} drives {first}"),
+                Target::PartIn(command.clone(), driven.clone()),
+            );
+            slot.offer(self.simulation, "u", command);
+            slot.context =
+                driven.iter().filter_map(|d| self.simulation.state(d)).map(|s| s.derivative.clone()).collect();
+            Some(slot)
+        };
+        found.into_iter().filter_map(slot).collect()
+    }
+}
+
+/// The commands in a derivative: sums of an input and of fed-back states that parameters alone multiply, one term of several in the balance of forces.
+fn commands_in<'e>(simulation: &Simulation, derivative: &'e Expr) -> Vec<&'e Expr> {
+    let (balance, _) = force_of(simulation, derivative);
+    let mut found: Vec<&Expr> = Vec::new();
+    if balance.terms().len() < 2 {
+        return found;
+    }
+    balance.visit(&mut |e| {
+        let part = match e {
+            Expr::Binary(BinaryOp::Mul, a, b) if is_gain(simulation, a) => b,
+            Expr::Binary(BinaryOp::Mul, a, b) if is_gain(simulation, b) => a,
+            _ => return,
+        };
+        let inside = |outer: &&Expr| {
+            let mut is = false;
+            outer.visit(&mut |e| is |= e == &**part);
+            is
+        };
+        // A controller's own error, as `r - q` in `kp*(r - q) - kd*w`, is a part of what it puts out.
+        if is_command(simulation, part) && !found.iter().any(inside) {
+            found.push(part);
+        }
+    });
+    found
+}
+
+/// Whether this is a factor that an actuator has, and not the inverse of a mass before the forces themselves.
+fn is_gain(simulation: &Simulation, e: &Expr) -> bool {
+    let inverse = matches!(e, Expr::Binary(BinaryOp::Div, one, _) if matches!(**one, Expr::Number(_)));
+    only_parameters(simulation, e) && !inverse
+}
+
+/// Whether a part of an equation is what a controller puts out. A difference of displacements is what a spring feels, and no command.
+fn is_command(simulation: &Simulation, part: &Expr) -> bool {
+    let drives = |e: &Expr| simulation.inputs.iter().any(|i| e.uses(&i.symbol));
+    let feeds_back = |e: &Expr| simulation.states.iter().filter(|s| e.uses(&s.name)).count();
+    let terms = part.terms();
+    let bare = |e: &Expr| matches!(e, Expr::Symbol(s) if simulation.state(s).is_some());
+    if !drives(part) || feeds_back(part) == 0 || terms.len() < 2 || terms.iter().any(|(_, e)| bare(e)) {
+        return false;
+    }
+    match simulation.unit_of_expr(part) {
+        Some(unit) => kinematic(Some(&unit), "") == Kinematic::Neither,
+        None => feeds_back(part) > 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The commands of a drive with this balance of its forces.
+    fn commands(balance: &str, units: bool) -> Vec<String> {
+        let unit = |u: &str| if units { format!(", unit = \"{u}\"") } else { String::new() };
+        let parameter = |name: &str, u: &str| format!("{name} = {{ value = 1.0, min = 0.1{} }}\n", unit(u));
+        let column = if units { "r = \"ref_rad\"\ni = \"current_A\"" } else { "r = \"first\"\ni = \"second\"" };
+        let parameters = [
+            parameter("J", "kg m^2"),
+            parameter("k", "N m/rad"),
+            parameter("b", "N m s/rad"),
+            parameter("K", "N m/A"),
+            parameter("P", "A/rad"),
+            parameter("D", "A s/rad"),
+            parameter("g", "1"),
+        ];
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\n{column}\n[parameters]\n{}[states]\nq = {{ derivative = \"w\", initial = 0.0{} }}\nw = {{ derivative = \"{balance}\", \
+             initial = 0.0{} }}\n[outputs]\ny = \"q + 0*r + 0*i\"\n",
+            parameters.concat(),
+            unit("rad"),
+            unit("rad/s")
+        );
+        let simulation = Simulation::parse(&text, "drive.sim.toml").unwrap();
+        let found = crate::slot::Structure::of(&simulation).slots;
+        let commands = found.iter().filter(|s| s.place == Place::Command);
+        commands.map(|s| s.quantity("u").unwrap().expression.to_string()).collect()
+    }
+
+    #[test]
+    fn what_a_controller_puts_out_is_a_command() {
+        for units in [true, false] {
+            assert_eq!(commands("(K*(i - P*q - D*w) - b*w)/J", units), ["i - P*q - D*w"]);
+            assert_eq!(commands("(K*(P*(r - q) - D*w) - b*w)/J", units), ["P*(r - q) - D*w"]);
+            assert_eq!(commands("K*(i - P*q - D*w)/J - b*w/J", units), ["i - P*q - D*w"]);
+        }
+    }
+
+    #[test]
+    fn what_a_spring_feels_and_the_balance_of_forces_are_none() {
+        for units in [true, false] {
+            for balance in [
+                "(k*(r - q) - b*w)/J",
+                "(K*i - b*w - k*q)/J",
+                "1/J*(K*i - b*w - k*q) - b*w/J",
+                "(K*i - b*w)/J - k*q/J",
+                "(k*(g*r - q) - b*w)/J",
+                "g*(K*i - b*w - k*q)/J",
+                "(k*(g*r - g*q) - b*w)/J",
+            ] {
+                assert_eq!(commands(balance, units), [""; 0], "{balance}");
+            }
+        }
+    }
+}
