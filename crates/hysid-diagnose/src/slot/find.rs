@@ -36,6 +36,13 @@ impl Structure {
         slots.extend(finder.parameters());
         slots.extend(finder.disturbances());
         let sensed = sensed(original);
+        let equations = finder.equations();
+        let presses = |symbol: &str| {
+            !equations.iter().any(|e| e.uses(symbol))
+                && simulation.unit_of(symbol).is_none_or(|u| is_one_of(&u, &["N", "N m", "Pa"]))
+        };
+        let idle_loads: Vec<String> =
+            (1..).zip(&simulation.inputs).filter(|(_, i)| presses(&i.symbol)).map(|(i, _)| format!("u_{i}")).collect();
         for slot in &mut slots {
             if let Target::Derivatives(states) = &slot.target {
                 let here = |s: &&Sensed| states.iter().any(|pull| pull.state == s.state);
@@ -48,6 +55,7 @@ impl Structure {
                 }
             }
             slot.inputs = simulation.inputs.len();
+            slot.idle_loads.clone_from(&idle_loads);
         }
         Self { slots }
     }

@@ -123,6 +123,7 @@ pub struct Slot {
     /// What is looked through for a mechanism that is already there.
     context: Vec<Expr>,
     inputs: usize,
+    idle_loads: Vec<String>,
     constant: bool,
     loops: bool,
     mass: bool,
@@ -154,6 +155,7 @@ impl Slot {
             sensed: Vec::new(),
             context: Vec::new(),
             inputs: 0,
+            idle_loads: Vec::new(),
             constant: false,
             loops: false,
             mass: false,
@@ -186,12 +188,18 @@ impl Slot {
     }
 
     /// The inputs that enter the equations here, as they are offered.
-    pub(crate) fn entering(&self) -> Vec<String> {
+    fn entering(&self) -> Vec<String> {
         let enters = |symbol: &String| {
             let here = |name: &String| self.context.iter().any(|e| e.uses(name));
             self.quantity(symbol).is_some_and(|q| q.expression.symbols().iter().any(here))
         };
         (1..=self.inputs).map(|i| format!("u_{i}")).filter(enters).collect()
+    }
+
+    /// The recorded inputs that may load a guide here, as they are offered: first those that the simulation makes no use of (somebody recorded a clamping
+    /// force), then those that enter the equations here.
+    pub(crate) fn loads(&self) -> Vec<String> {
+        self.idle_loads.iter().cloned().chain(self.entering()).collect()
     }
 
     /// Whether a parameter of its own is added to the force or to the output here: an offset.

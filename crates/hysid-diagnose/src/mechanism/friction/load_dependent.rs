@@ -31,13 +31,14 @@ pub static LOAD_DEPENDENT_FRICTION: Mechanism = Mechanism {
     reference: "P. Hamon, M. Gautier, P. Garrec, Dynamic identification of robots with a dry friction model depending on load and velocity, IROS (2010) 6187-6193",
 };
 
-/// The recorded input that loads the guide, with the name of its coefficient. Where two enter the force (a motor's torque and the load at the tool) no
-/// equation tells which of them presses: both are looked for, and each is fitted by itself.
+/// The recorded input that loads the guide, with the name of its coefficient. Where there are two (a motor's torque and the load at the tool, or a clamping
+/// force that the simulation makes no use of) no equation tells which of them presses: both are looked for, and each is fitted by itself.
 fn loads(slot: &Slot, purpose: Purpose) -> Vec<(&'static str, String)> {
-    match (&slot.entering()[..], purpose) {
+    match (&slot.loads()[..], purpose) {
         ([one, other, ..], Purpose::Screening) => vec![("mu", one.clone()), ("mu_2", other.clone())],
         ([_, other, ..], Purpose::Form(Form::Other)) => vec![("mu", other.clone())],
-        _ => vec![("mu", "u".to_owned())],
+        ([one, ..], _) => vec![("mu", one.clone())],
+        ([], _) => vec![("mu", "u".to_owned())],
     }
 }
 
@@ -56,7 +57,16 @@ mod tests {
         let slot = structure.slots.iter().find(|s| s.place == Place::Force).unwrap();
         let of = |purpose| loads(slot, purpose).into_iter().map(|(_, u)| u).collect::<Vec<_>>();
         assert_eq!(of(Purpose::Screening), ["u_2", "u_3"]);
-        assert_eq!(of(Purpose::Refit), ["u"]);
+        assert_eq!(of(Purpose::Refit), ["u_2"]);
         assert_eq!(of(Purpose::Form(Form::Other)), ["u_3"]);
+    }
+
+    #[test]
+    fn a_recorded_force_that_the_simulation_makes_no_use_of_may_be_the_load() {
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nT = \"temp_K\"\nF = \"drive_N\"\nF_n = \"clamp_N\"\n[parameters]\nm = { value = 2.0, min = 0.1 }\n\
+                    [states]\nx = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"F/m\", initial = 0.0 }\n[outputs]\nx_m = \"x\"\n";
+        let structure = Structure::of(&Simulation::parse(text, "slide.sim.toml").unwrap());
+        let slot = structure.slots.iter().find(|s| s.place == Place::Force).unwrap();
+        assert_eq!(slot.loads(), ["u_3", "u_2"]);
     }
 }
