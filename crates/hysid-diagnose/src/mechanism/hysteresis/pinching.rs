@@ -1,6 +1,6 @@
 //! A hysteretic spring that slips near the middle.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_grid};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
 /// A hysteretic spring that slips near the middle.
@@ -20,6 +20,22 @@ pub static PINCHING: Mechanism = Mechanism {
                 .detail(purpose, "q_z", "1", vec![0.1], (-0.5, 0.9))
                 .constant("z_u", "z", Grid::Reach("z", vec![1.0]))
                 .silent();
+        }
+        // Slip about one place of the motion, as of a nail in the hole that it has worn, where the other form slips wherever the force turns.
+        if purpose == Purpose::Form(Form::Other) {
+            return Law::force("F_h*z*(1 - zeta_1*exp(-(x/x_p)^2))")
+                .amplitude("F_h", "F", 0.0, 2.0)
+                .shape("x_y", "x", log_grid(0.1, 2.0, 4))
+                .within(0.02, 20.0)
+                .at_least(0.2, "v*h")
+                .shape("zeta_1", "1", Grid::Values(vec![0.6]))
+                .within(0.0, 1.0)
+                .shape("x_p", "x", log_grid(0.2, 1.5, 3))
+                .within(0.02, 5.0)
+                .shape("b", "1", Grid::Values(vec![0.5]))
+                .within(0.3, 5.0)
+                .relaxing("z", "v - b*abs(v)*z - (1 - b)*v*abs(z)", "x_y")
+                .report("k_h", "F/x", "F_h/x_y");
         }
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
