@@ -155,3 +155,30 @@ impl Rewritten {
         amplitudes.chain(shapes).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Between two lines that a recording just tells apart there is one cycle more over its length, one turn more over its travel.
+    #[test]
+    fn the_spacing_of_lines_is_that_of_whole_cycles() {
+        let shape = |places, over| Shape {
+            name: "p".into(),
+            grid: vec![0.1, 0.2, 0.4],
+            pointed: Vec::new(),
+            searched: true,
+            places,
+            over,
+            told_from: None,
+        };
+        let (travel, period) = (500.0, 0.4);
+        let next = period + shape(Places::Turns, travel).spacing(period) / LOBES;
+        assert!((travel / period - travel / next - 1.0).abs() < 2e-3, "{next}");
+        let (duration, frequency) = (20.0, 3.0);
+        let next = frequency + shape(Places::Lines, duration).spacing(frequency) / LOBES;
+        assert!((duration * next - duration * frequency - 1.0).abs() < 1e-9, "{next}");
+        assert!((shape(Places::Any, duration).spacing(0.25) - 0.2).abs() < 1e-12);
+        assert!((shape(Places::Moments, duration).spacing(0.5) - 0.2).abs() < 1e-12);
+    }
+}

@@ -145,3 +145,38 @@ pub fn starting_values(setting: &Setting<'_>, parent: &Hypothesis<'_>, candidate
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::evidence::quantile;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use crate::search::screen::screen;
+
+    /// A gap in the spring far below the least of the grid: the grid's best point is several times too wide, the second start is not.
+    #[test]
+    fn a_law_whose_strength_is_in_its_shapes_begins_second_as_weak_as_the_screening_has_it() {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut random = normal(6);
+        let u = drive(900, &mut random);
+        let mut reach: Vec<f64> = respond(&u, REAL, |_, _| 0.0).into_iter().map(f64::abs).collect();
+        reach.sort_by(f64::total_cmp);
+        let gap = 0.3 * quantile(&reach, 0.1).unwrap();
+        let mut y = respond(&u, REAL, |x, _| -REAL.2 * x.clamp(-gap, gap));
+        let noise = 1e-3 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * random());
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let found =
+            screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| m.id == "spring_clearance");
+        let starts = starts(&found[0]);
+        let begun = |i: usize| starts[i][0].1 / gap;
+        assert!(begun(0) > 2.0 && (0.5..1.6).contains(&begun(1)), "{} and {} times the gap", begun(0), begun(1));
+    }
+}
