@@ -36,13 +36,7 @@ impl Structure {
         slots.extend(finder.parameters());
         slots.extend(finder.disturbances());
         let sensed = sensed(original);
-        let equations = finder.equations();
-        let presses = |symbol: &str| {
-            !equations.iter().any(|e| e.uses(symbol))
-                && simulation.unit_of(symbol).is_none_or(|u| is_one_of(&u, &["N", "N m", "Pa"]))
-        };
-        let idle_loads: Vec<String> =
-            (1..).zip(&simulation.inputs).filter(|(_, i)| presses(&i.symbol)).map(|(i, _)| format!("u_{i}")).collect();
+        let idle_loads = finder.idle_loads();
         for slot in &mut slots {
             if let Target::Derivatives(states) = &slot.target {
                 let here = |s: &&Sensed| states.iter().any(|pull| pull.state == s.state);
@@ -91,6 +85,16 @@ impl Finder<'_> {
         self.motions.is_empty()
             && prescribed
             && !self.simulation.outputs.iter().any(|o| moves(&o.column, &o.expression))
+    }
+
+    /// The inputs that press, by their unit or for all that is known, and that the simulation as the user wrote it makes no use of, as they are offered.
+    fn idle_loads(&self) -> Vec<String> {
+        let presses = |symbol: &str| {
+            !self.original.expressions().into_iter().any(|(_, e)| e.uses(symbol))
+                && self.simulation.unit_of(symbol).is_none_or(|u| is_one_of(&u, &["N", "N m", "Pa"]))
+        };
+        let inputs = (1..).zip(&self.simulation.inputs);
+        inputs.filter(|(_, i)| presses(&i.symbol)).map(|(i, _)| format!("u_{i}")).collect()
     }
 
     pub(super) fn equations(&self) -> Vec<Expr> {

@@ -199,7 +199,8 @@ impl Slot {
     /// The recorded inputs that may load a guide here, as they are offered: first those that the simulation makes no use of (somebody recorded a clamping
     /// force), then those that enter the equations here.
     pub(crate) fn loads(&self) -> Vec<String> {
-        self.idle_loads.iter().cloned().chain(self.entering()).collect()
+        let others = self.entering().into_iter().filter(|u| !self.idle_loads.contains(u));
+        self.idle_loads.iter().cloned().chain(others).collect()
     }
 
     /// Whether a parameter of its own is added to the force or to the output here: an offset.

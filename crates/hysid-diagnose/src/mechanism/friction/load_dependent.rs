@@ -68,5 +68,11 @@ mod tests {
         let structure = Structure::of(&Simulation::parse(text, "slide.sim.toml").unwrap());
         let slot = structure.slots.iter().find(|s| s.place == Place::Force).unwrap();
         assert_eq!(slot.loads(), ["u_3", "u_2"]);
+        // Nor is it another where its effect has been written.
+        let original = Simulation::parse(text, "slide.sim.toml").unwrap();
+        let with_it =
+            Simulation::parse(&text.replace("F/m", "(F - 0.1*abs(F_n)*sign(v))/m"), "slide.sim.toml").unwrap();
+        let structure = Structure::within(&with_it, &original);
+        assert_eq!(structure.slots.iter().find(|s| s.place == Place::Force).unwrap().loads(), ["u_3", "u_2"]);
     }
 }
