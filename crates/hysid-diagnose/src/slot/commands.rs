@@ -30,8 +30,7 @@ impl Finder<'_> {
                 Target::PartIn(command.clone(), driven.clone()),
             );
             slot.offer(self.simulation, "u", command);
-            slot.context =
-                driven.iter().filter_map(|d| self.simulation.state(d)).map(|s| s.derivative.clone()).collect();
+            slot.context = self.derivatives_of(&driven);
             Some(slot)
         };
         found.into_iter().filter_map(slot).collect()

@@ -87,14 +87,9 @@ impl Finder<'_> {
             && !self.simulation.outputs.iter().any(|o| moves(&o.column, &o.expression))
     }
 
-    /// The inputs that press, by their unit or for all that is known, and that the simulation as the user wrote it makes no use of, as they are offered.
-    fn idle_loads(&self) -> Vec<String> {
-        let presses = |symbol: &str| {
-            !self.original.expressions().into_iter().any(|(_, e)| e.uses(symbol))
-                && self.simulation.unit_of(symbol).is_none_or(|u| is_one_of(&u, &["N", "N m", "Pa"]))
-        };
-        let inputs = (1..).zip(&self.simulation.inputs);
-        inputs.filter(|(_, i)| presses(&i.symbol)).map(|(i, _)| format!("u_{i}")).collect()
+    /// The derivatives of these states.
+    pub(super) fn derivatives_of(&self, states: &[String]) -> Vec<Expr> {
+        states.iter().filter_map(|s| self.simulation.state(s)).map(|s| s.derivative.clone()).collect()
     }
 
     pub(super) fn equations(&self) -> Vec<Expr> {
@@ -213,8 +208,7 @@ impl Finder<'_> {
                 Target::SymbolIn(source.to_owned(), driven.clone(), others),
             );
             slot.offer(self.simulation, "u", signal);
-            slot.context =
-                driven.iter().filter_map(|d| self.simulation.state(d)).map(|s| s.derivative.clone()).collect();
+            slot.context = self.derivatives_of(&driven);
             slots.push(slot);
         }
         slots

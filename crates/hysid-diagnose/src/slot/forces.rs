@@ -55,6 +55,16 @@ impl Finder<'_> {
         slot.constant = has_free_constant(simulation, force);
     }
 
+    /// The inputs that press, by their unit or for all that is known, and that the simulation as the user wrote it makes no use of, as they are offered.
+    pub(super) fn idle_loads(&self) -> Vec<String> {
+        let presses = |symbol: &str| {
+            !self.original.expressions().into_iter().any(|(_, e)| e.uses(symbol))
+                && self.simulation.unit_of(symbol).is_none_or(|u| is_one_of(&u, &["N", "N m", "Pa"]))
+        };
+        let inputs = (1..).zip(&self.simulation.inputs);
+        inputs.filter(|(_, i)| presses(&i.symbol)).map(|(i, _)| format!("u_{i}")).collect()
+    }
+
     pub(super) fn motion_slot(&self, place: Place, label: String, motion: &Motion<'_>) -> Slot {
         let target = Target::Derivatives(vec![Pull::new(motion.state, 1.0)]);
         let mut slot = Slot::new(place, label, format!("at {}", motion.name()), target);

@@ -36,10 +36,7 @@ impl Expr {
 
     /// The expression with every use of `symbol` replaced by `by`.
     pub fn substitute(&self, symbol: &str, by: &Expr) -> Expr {
-        self.map(&mut |e| match e {
-            Self::Symbol(name) if name == symbol => by.clone(),
-            other => other,
-        })
+        self.replace(&Self::symbol(symbol), by)
     }
 
     /// The expression with every occurrence of `part`, as it is written, replaced by `by`.
