@@ -23,7 +23,7 @@ pub enum Purpose {
 /// Another form of a law. A law that has no such form is written as the plain one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Form {
-    /// A weight for each of a few terms, in place of a series with a few shape parameters: three plays for a smooth density.
+    /// A weight for each of a few terms, in place of a series with a few shape parameters: three plays for a smooth density; one term of two.
     Few,
     /// The law in another arrangement: plays that widen with the rate in place of a lag behind them, powers about the point of operation, a loop
     /// that stiffens where the plain one gives way.

@@ -16,10 +16,14 @@ use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 const WORTH_REFINING: f64 = 10.0;
 /// Log evidence that an effect may lack where a form has no more unknowns than it has now.
 const WORTH_RECASTING: f64 = -5.0;
+/// Log evidence that it may lack besides for each unknown that the form has less.
+const UNKNOWN: f64 = 8.0;
 /// Log evidence that makes an effect plain to see.
 const PLAIN_TO_SEE: f64 = 100.0;
 /// Log evidence within which two forms tie.
 const TIE: f64 = 3.0;
+/// Log likelihood by which one that ties must lead to be taken.
+const LESS_LEFT: f64 = 1.0;
 /// Iterations of a fit that tells from which start a form is fitted.
 const SKETCH: usize = 3;
 /// Most starts of a form.
@@ -39,11 +43,11 @@ pub fn finer<'d>(
     let now = unknowns(&present);
     let mut forms: Vec<Hypothesis<'d>> = Vec::new();
     for (purpose, law) in effect.mechanism.forms(&effect.slot) {
-        let more = unknowns(&law) > now;
+        let own = unknowns(&law);
         let worth = match purpose {
             Purpose::Form(Form::FinerUnsettled) => PLAIN_TO_SEE,
-            _ if more => WORTH_REFINING,
-            _ => WORTH_RECASTING,
+            _ if own > now => WORTH_REFINING,
+            _ => WORTH_RECASTING - UNKNOWN * (now - own) as f64,
         };
         if purpose == effect.written.purpose || h.log_evidence < trunk.log_evidence + worth {
             continue;
@@ -60,11 +64,16 @@ pub fn finer<'d>(
 }
 
 /// The form to be taken, of their evidences and log likelihoods: the one with the most evidence. Where an effect is plain to see, of those that
-/// tie the one that leaves the least: they say the same, and what a smooth curve leaves of an angular one would pass for another effect.
+/// tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would pass for
+/// another effect.
 fn preferred(merits: &[(f64, f64)], plain: bool) -> Option<usize> {
-    let top = merits.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
-    let tie = if plain { TIE } else { 0.0 };
-    (0..merits.len()).filter(|&i| merits[i].0 >= top - tie).max_by(|&a, &b| merits[a].1.total_cmp(&merits[b].1))
+    let most = |among: &mut dyn Iterator<Item = usize>, merit: fn(&(f64, f64)) -> f64| {
+        among.max_by(|&a, &b| merit(&merits[a]).total_cmp(&merit(&merits[b])))
+    };
+    let top = most(&mut (0..merits.len()), |m| m.0)?;
+    let ties = |i: &usize| plain && merits[*i].0 >= merits[top].0 - TIE;
+    let closest = most(&mut (0..merits.len()).filter(ties), |m| m.1);
+    closest.filter(|&i| merits[i].1 > merits[top].1 + LESS_LEFT).or(Some(top))
 }
 
 /// What a law asks of the recording.
@@ -184,6 +193,8 @@ mod tests {
         check(&near, false, 1);
         check(&[(300.0, 315.0), (345.8, 357.0), (341.0, 371.0)], true, 1);
         check(&[(8.0, 15.0), (7.9, 15.5)], false, 0);
+        // A term that brings nothing.
+        check(&[(183.5, 188.40), (186.0, 188.39)], true, 1);
     }
 
     #[test]

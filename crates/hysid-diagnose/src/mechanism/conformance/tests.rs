@@ -321,3 +321,32 @@ fn a_law_can_take_the_place_of_what_it_contains() {
     assert!(servo.parameter(&name).is_some(), "{name}");
     assert_eq!(own("Oscillator"), None);
 }
+
+/// Nothing drives or brakes this rotor: the law in each of its forms keeps its energy, which no wrong force beside the mass does.
+#[test]
+fn an_inertia_that_depends_on_the_angle_keeps_the_energy() {
+    let text = "[time]\nperiod_s = 0.002\n[inputs]\nu = \"torque_Nm\"\n[parameters]\nJ = { value = 0.4, min = 0.1, unit = \"kg m^2\" }\n\
+                [states]\nq = { derivative = \"w\", initial = 0.3, unit = \"rad\" }\nw = { derivative = \"u/J\", initial = 6.0, unit = \"rad/s\" }\n\
+                [outputs]\nangle_rad = \"q\"\nspeed_rad_s = \"w\"\n";
+    let rotor = Simulation::parse(text, "rotor.sim.toml").unwrap();
+    let inertia = crate::mechanism::mechanism("position_dependent_inertia").unwrap();
+    let slot = inertia.slots(&Structure::of(&rotor)).remove(0);
+    let signals = example_signals(&rotor, &slot);
+    let drive = hysid_plant::Drive::new(0.0, 0.002, 1000, vec![vec![0.0; 1000]]).unwrap();
+    // What each form adds to the inertia, by its parameters.
+    type Added = fn(f64) -> f64;
+    let forms: [(Purpose, &[(&str, f64)], Added); 3] = [
+        (Purpose::Refit, &[("m_c", 0.15), ("m_s", -0.1)], |q| 0.15 * (1.0 - (2.0 * q).cos()) - 0.1 * (2.0 * q).sin()),
+        (Purpose::Form(Form::Few), &[("m_c", 0.15), ("m_s", -0.1)], |q| 0.15 * (1.0 - q.cos()) - 0.1 * q.sin()),
+        (Purpose::Form(Form::Other), &[("m_1", 0.02)], |q| 0.02 * q * q),
+    ];
+    for (purpose, values, added) in forms {
+        let written = inertia.rewrite(&rotor, &slot, &signals, purpose).unwrap();
+        let values: Vec<(String, f64)> = values.iter().map(|(name, x)| ((*name).to_owned(), *x)).collect();
+        let motion = motion::outputs(&motion::with(&written.simulation, &values), &drive).unwrap();
+        let energy = |n: usize| 0.5 * (0.4 + added(motion[0][n])) * motion[1][n].powi(2);
+        let most = (0..1000).map(|n| (energy(n) / energy(0) - 1.0).abs()).fold(0.0, f64::max);
+        assert!(most < 1e-6, "{purpose:?}: {most}");
+        assert!(motion[0][999] > 5.0 && added(motion[0][999]).abs() > 1e-3, "{purpose:?}: {}", motion[0][999]);
+    }
+}

@@ -1,6 +1,6 @@
 //! The weight of an arm or a pendulum.
 
-use crate::mechanism::{Block, Family, Law, Mechanism, Need};
+use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
 /// The weight of an arm or a pendulum.
@@ -11,7 +11,20 @@ pub static GRAVITY: Mechanism = Mechanism {
     places: &[Place::Force],
     applies: |slot| slot.has("x") && slot.has("rad"),
     already: &["sin(rad*x)", "sin(x)", "sin(P*x)", "sin(x*P)", "sin(x + P)", "sin(x - P)", "cos(x)", "cos(x + P)"],
-    law: |_, _| {
+    law: |_, purpose| {
+        // An angle is mostly counted from where the arm hangs or from where it is level.
+        let one = |name: &str, wave: &str, phase: &str| {
+            Law::force(format!("{name}*{wave}(rad*x)"))
+                .amplitude(name, "F", -2.0, 2.0)
+                .silent()
+                .report("G", "F", format!("abs({name})"))
+                .report("phi", "1", phase)
+        };
+        match purpose {
+            Purpose::Form(Form::Other) => return one("G_s", "sin", "atan2(0, G_s)"),
+            Purpose::Form(Form::Few) => return one("G_c", "cos", "atan2(G_c, 0)"),
+            _ => {}
+        }
         Law::force("G_s*sin(rad*x) + G_c*cos(rad*x)")
             .amplitude("G_s", "F", -2.0, 2.0)
             .silent()
@@ -21,7 +34,14 @@ pub static GRAVITY: Mechanism = Mechanism {
             .report("phi", "1", "atan2(G_c, G_s)")
     },
     contains: &[],
-    confusable: &["input_offset", "cubic_stiffness", "quadratic_stiffness"],
+    confusable: &[
+        "input_offset",
+        "cubic_stiffness",
+        "quadratic_stiffness",
+        "gap_stop",
+        "bilinear_stiffness",
+        "position_dependent_inertia",
+    ],
     needs: &[Need::Angle(0.3)],
     sentence: "A weight pulls {place}: up to {G}, as the sine of the angle plus {phi} rad; the simulation has none.",
     signature: "For small swings a stiffness and an offset; for large ones softening.",
