@@ -7,6 +7,7 @@
 use hysid_plant::{Expr, Function, Hold, Memory, Simulation};
 
 use crate::mechanism::{Block, Family, Law, Mechanism};
+use crate::slot::Structure;
 
 /// The simulation's own numerics: step, hold, clock, smoothing.
 pub static SOLVER_ARTEFACT: Mechanism = Mechanism {
@@ -63,25 +64,27 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
     if late.validate().is_ok() {
         found.push(Variant { what: "outputs half a sample late", simulation: late });
     }
-    let replaced = |law: &dyn Fn(Vec<Expr>) -> Expr| {
+    let slots = Structure::of(simulation).slots;
+    let sharpened = |sticks: bool| {
         let mut other = simulation.clone();
-        let mut smoothed = false;
         other.map_equations(|e| {
-            e.map(&mut |e| match e {
+            let steps = e.map(&mut |e| match e {
                 Expr::Call(Function::Tanh, arguments) if uses_state(simulation, &arguments) => {
-                    smoothed = true;
-                    law(arguments)
+                    if sticks {
+                        Expr::Call(Function::Sign, arguments)
+                    } else {
+                        Expr::Call(Function::Tanh, arguments.into_iter().map(|a| Expr::Number(3.0) * a).collect())
+                    }
                 }
                 other => other,
-            })
+            });
+            // Signs that are smoothed otherwise are told by the velocity in them.
+            slots.iter().fold(steps, |e, slot| slot.sharpened(&e, sticks))
         });
-        smoothed.then_some(other)
+        (other != *simulation).then_some(other)
     };
     // However sharp a smoothed law is, it creeps where the machine sticks, and the sharper it is, the more steps it needs.
-    let sticks = replaced(&|arguments| Expr::Call(Function::Sign, arguments));
-    let sharper = replaced(&|arguments| {
-        Expr::Call(Function::Tanh, arguments.into_iter().map(|a| Expr::Number(3.0) * a).collect())
-    });
+    let (sticks, sharper) = (sharpened(true), sharpened(false));
     for (what, other) in [(STICKS, sticks), (SHARPER, sharper)] {
         found.extend(other.map(|simulation| Variant { what, simulation }));
     }

@@ -24,7 +24,7 @@ mod sensed;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 
-use hysid_plant::{Expr, Simulation, Unit};
+use hysid_plant::{Expr, Function, Simulation, Unit};
 
 pub use find::Structure;
 
@@ -32,7 +32,16 @@ pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
 
 /// Smoothed signs of a velocity that a simulation may have in the place of the sharp one.
-const SMOOTH_SIGNS: [&str; 4] = ["tanh(v/P)", "tanh(P*v)", "v/(abs(v) + P)", "v/sqrt(v^2 + P)"];
+const SMOOTH_SIGNS: [&str; 7] =
+    ["tanh(v/P)", "tanh(P*v)", "atan(v/P)", "atan(P*v)", "v/(abs(v) + P)", "v/sqrt(v^2 + P)", "v/sqrt(v*v + P)"];
+
+/// What a smoothed sign of this form comes to at large velocities.
+fn reach(form: &Expr) -> Expr {
+    match form {
+        Expr::Call(Function::Atan, _) => Expr::symbol("pi") / 2.0,
+        _ => Expr::Number(1.0),
+    }
+}
 
 /// The symbol for the velocity as the simulation has it, where that is not the rate of the displacement.
 pub(crate) const OWN_VELOCITY: &str = "v_own";
@@ -262,12 +271,31 @@ impl Slot {
 
     /// Offers the sign of the velocity as the equations here smooth it, where they do: friction that sticks beside one that creeps is another machine.
     fn offer_own_sign(&mut self, simulation: &Simulation) {
-        let symbol = |s: &str| self.symbols.get(s).map(|q| q.expression.clone());
-        let forms: Vec<Expr> = SMOOTH_SIGNS.iter().filter_map(|form| pattern::prepare(form, symbol)).collect();
-        let sign = forms.iter().find_map(|form| self.context.iter().find_map(|e| pattern::part(form, e)));
-        if let Some(sign) = sign {
-            self.offer(simulation, "own_sign", sign);
+        let Some(form) = self.smooth_sign() else { return };
+        if let Some(part) = self.context.iter().find_map(|e| pattern::part(&form, e)) {
+            self.offer(simulation, "own_sign", (part / reach(&form)).simplified());
         }
+    }
+
+    /// The form in which the equations here smooth the sign of the velocity, if they do.
+    fn smooth_sign(&self) -> Option<Expr> {
+        let symbol = |s: &str| self.symbols.get(s).map(|q| q.expression.clone());
+        let forms = SMOOTH_SIGNS.iter().filter_map(|form| pattern::prepare(form, symbol));
+        forms.into_iter().find(|form| self.context.iter().any(|e| pattern::part(form, e).is_some()))
+    }
+
+    /// An equation with the smoothed sign of the velocity replaced: three times as sharp, or one that sticks. As it is where it holds none.
+    pub(crate) fn sharpened(&self, equation: &Expr, sticks: bool) -> Expr {
+        let (Some(form), Some(v)) = (self.smooth_sign(), self.quantity("v").map(|q| &q.expression)) else {
+            return equation.clone();
+        };
+        pattern::replaced(&form, equation, &|part| {
+            if sticks {
+                (v.clone().sign() * reach(&form)).simplified()
+            } else {
+                part.replace(v, &(Expr::Number(3.0) * v.clone()))
+            }
+        })
     }
 
     /// The symbol that multiplies, alone, something of one of these forms in the equations here.
@@ -296,7 +324,7 @@ impl Slot {
         let mut found = false;
         for e in &self.context {
             e.visit(&mut |e| {
-                found |= matches!(e, Expr::Call(hysid_plant::Function::Sqrt, a)
+                found |= matches!(e, Expr::Call(Function::Sqrt, a)
                     if a.iter().any(|a| used.iter().any(|s| a.uses(s))));
             });
         }

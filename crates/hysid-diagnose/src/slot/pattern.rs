@@ -30,7 +30,7 @@ pub(super) fn prepare(form: &str, known: impl Fn(&str) -> Option<Expr>) -> Optio
 /// Whether any part of `expr` has this form.
 pub(super) fn occurs(form: &Expr, expr: &Expr) -> bool {
     let mut found = false;
-    expr.visit(&mut |e| found = found || matches(form, e));
+    expr.visit(&mut |e| found = found || matches(form, e) || quotient(form, e).is_some());
     if found {
         return true;
     }
@@ -49,22 +49,51 @@ pub(super) fn occurs(form: &Expr, expr: &Expr) -> bool {
 pub(super) fn part(form: &Expr, expr: &Expr) -> Option<Expr> {
     let mut found = None;
     expr.visit(&mut |e| {
-        if found.is_none() && matches(form, e) {
-            found = Some(e.clone());
+        if found.is_none() {
+            found = if matches(form, e) { Some(e.clone()) } else { quotient(form, e).map(|(part, _)| part) };
         }
     });
     found
+}
+
+/// The part of a quotient that has the form of one, and the other factors above its line: `F*v/(abs(v) + e)` holds `v/(abs(v) + e)`, and the tree has
+/// no such branch.
+fn quotient<'e>(form: &Expr, expr: &'e Expr) -> Option<(Expr, Vec<&'e Expr>)> {
+    let (Expr::Binary(BinaryOp::Div, wanted, divisor), Expr::Binary(BinaryOp::Div, above, below)) = (form, expr) else {
+        return None;
+    };
+    if !matches(divisor, below) || !matches!(**above, Expr::Binary(BinaryOp::Mul, ..)) {
+        return None;
+    }
+    let mut others = multiplied(above);
+    let own = others.remove(others.iter().position(|f| matches(wanted, f))?);
+    Some((own.clone() / (**below).clone(), others))
+}
+
+/// The expression with every part of this form replaced, also where something else stands above its line.
+pub(super) fn replaced(form: &Expr, expr: &Expr, by: &dyn Fn(&Expr) -> Expr) -> Expr {
+    expr.map(&mut |e| match quotient(form, &e) {
+        Some((part, others)) => others.into_iter().rev().fold(by(&part), |product, other| other.clone() * product),
+        None if matches(form, &e) => by(&e),
+        None => e,
+    })
 }
 
 /// The symbol that is the only other factor of a product which `expr` holds of something of this form: `F` of `F*sign(v)`.
 pub(super) fn size_of<'e>(form: &Expr, expr: &'e Expr) -> Option<&'e str> {
     let mut found = None;
     expr.visit(&mut |e| {
-        if let Expr::Binary(BinaryOp::Mul, ..) = e {
-            let (of_form, others): (Vec<&Expr>, Vec<&Expr>) = factors(e).into_iter().partition(|f| matches(form, f));
-            if let ([_], [Expr::Symbol(size)]) = (&of_form[..], &others[..]) {
-                found.get_or_insert(size.as_str());
+        let others = match (e, quotient(form, e)) {
+            (_, Some((_, others))) => others,
+            (Expr::Binary(BinaryOp::Mul, ..), None) => {
+                let (of_form, others): (Vec<&Expr>, Vec<&Expr>) =
+                    factors(e).into_iter().partition(|f| matches(form, f));
+                if of_form.len() == 1 { others } else { return }
             }
+            _ => return,
+        };
+        if let [Expr::Symbol(size)] = others[..] {
+            found.get_or_insert(size.as_str());
         }
     });
     found
@@ -90,6 +119,14 @@ fn factors(expr: &Expr) -> Vec<&Expr> {
     match expr {
         Expr::Binary(BinaryOp::Mul, a, b) => factors(a).into_iter().chain(factors(b)).collect(),
         Expr::Binary(BinaryOp::Div, a, _) | Expr::Neg(a) => factors(a),
+        other => vec![other],
+    }
+}
+
+/// What a product is made of, without a look at signs and quotients.
+fn multiplied(expr: &Expr) -> Vec<&Expr> {
+    match expr {
+        Expr::Binary(BinaryOp::Mul, a, b) => multiplied(a).into_iter().chain(multiplied(b)).collect(),
         other => vec![other],
     }
 }
@@ -145,6 +182,23 @@ mod tests {
         check("v*abs(v)", "u - c*abs(v)*v", true);
         check("abs(v)*Z", "v - abs(v)*z/g", true);
         check("abs(v)*Z", "v - abs(v)", false);
+        check("v/(abs(v) + P)", "u - F*v/(abs(v) + e)", true);
+        check("v/(abs(v) + P)", "u - F*v*N/(e + abs(v))/m", true);
+        check("v/(abs(v) + P)", "u - F*w/(abs(v) + e)", false);
+    }
+
+    #[test]
+    fn what_stands_above_a_line_keeps_the_other_factors() {
+        let form = prepare("v/(abs(v) + P)", |s| (s == "v").then(|| Expr::symbol("v"))).unwrap();
+        let check = |text: &str, own: &str, expected: &str| {
+            let expr = Expr::parse(text).unwrap();
+            assert_eq!(part(&form, &expr).unwrap().to_string(), own, "{text}");
+            let sharp = replaced(&form, &expr, &|_| Expr::parse("sign(v)").unwrap());
+            assert_eq!(sharp.to_string(), Expr::parse(expected).unwrap().to_string(), "{text}");
+        };
+        check("u - F*v/(abs(v) + e)", "v/(abs(v) + e)", "u - F*sign(v)");
+        check("(u - mu*v*N/(e + abs(v)))/m", "v/(e + abs(v))", "(u - mu*(N*sign(v)))/m");
+        check("u - F*(v/(abs(v) + e))", "v/(abs(v) + e)", "u - F*sign(v)");
     }
 
     #[test]
@@ -158,5 +212,7 @@ mod tests {
         check("u - mu*N*sign(v)", None);
         check("u - c*v", None);
         check("u - sign(v)", None);
+        let smooth = prepare("v/(abs(v) + P)", |s| (s == "v").then(|| Expr::symbol("v"))).unwrap();
+        assert_eq!(size_of(&smooth, &Expr::parse("(u - F*v/(abs(v) + e))/m").unwrap()), Some("F"));
     }
 }

@@ -299,12 +299,40 @@ fn what_a_friction_lacks_is_written_as_the_simulation_has_it() {
         let written = mechanism.rewrite(&simulation, &slot, &signals, Purpose::Refit).unwrap();
         written.simulation.state("v").unwrap().derivative.to_string()
     };
-    for own in ["tanh(v/0.01)", "tanh(50*v)"] {
+    for own in ["tanh(v/0.01)", "tanh(50*v)", "(v/(abs(v) + 0.01))", "(v/sqrt(v^2 + 0.0001))"] {
         let stribeck = written(own, "stribeck_friction");
         assert!(stribeck.contains(&format!("exp(-(v/v_s)^2)*{own}")) && !stribeck.contains("sign("), "{stribeck}");
-        assert!(written(own, "asymmetric_friction").contains(&format!("F_a*abs({own})")));
+        let bare = own.trim_start_matches('(');
+        assert!(written(own, "asymmetric_friction").contains(&format!("F_a*abs({bare}")));
     }
-    assert!(written("sign(v)", "stribeck_friction").contains("exp(-(v/v_s)^2)*sign(v)"));
+    let written = |own: &str| written(own, "stribeck_friction");
+    assert!(written("sign(v)").contains("exp(-(v/v_s)^2)*sign(v)"));
+    assert!(written("v/(abs(v) + 0.01)").contains("exp(-(v/v_s)^2)*(v/(abs(v) + 0.01))"));
+    assert!(written("atan(v/0.01)*2/pi").contains("exp(-(v/v_s)^2)*(atan(v/0.01)/(pi/2))"));
+}
+
+/// A smoothed sign can be made sharper or stick in whatever form it is written.
+#[test]
+fn a_smoothed_friction_has_variants_that_are_sharper_and_stick() {
+    use crate::mechanism::numerics::variants;
+
+    let servo = specimens().into_iter().find(|s| s.title.starts_with("Servo")).unwrap();
+    let sharp = servo.state("v").unwrap().derivative.to_string();
+    let forms = |own: &str| -> Vec<String> {
+        let mut simulation = servo.clone();
+        simulation.state_mut("v").unwrap().derivative = Expr::parse(&sharp.replace("sign(v)", own)).unwrap();
+        let found = variants(&simulation, 0.01).into_iter().filter(|v| v.what.contains("friction"));
+        found.map(|v| v.simulation.state("v").unwrap().derivative.to_string()).collect()
+    };
+    assert!(forms("sign(v)").is_empty());
+    for (own, sharper, sticks) in [
+        ("tanh(v/0.01)", "tanh(3*(v/0.01))", "sign(v/0.01)"),
+        ("v/(abs(v) + 0.01)", "(3*v/(abs(3*v) + 0.01))", "sign(v)"),
+        ("atan(v/0.01)*2/pi", "atan(3*v/0.01)", "(sign(v)*(pi/2))*2/pi"),
+    ] {
+        let found = forms(own);
+        assert!(found.len() == 2 && found[0].contains(sticks) && found[1].contains(sharper), "{own}: {found:?}");
+    }
 }
 
 /// Bristles stand in the place of the simulation's own dry friction, where it has one.
