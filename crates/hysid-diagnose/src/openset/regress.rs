@@ -22,7 +22,9 @@ pub fn regress(
         x
     };
     let white: Vec<Vec<f64>> = all.iter().map(|c| weigh(noise.apply(layout, c))).collect();
-    let norms: Vec<f64> = white.iter().map(|c| norm2(c).sqrt().max(f64::MIN_POSITIVE)).collect();
+    // A parameter without any influence here has a tangent of zeros.
+    let size = |c: &Vec<f64>| Some(norm2(c).sqrt()).filter(|n| *n > 0.0).unwrap_or(1.0);
+    let norms: Vec<f64> = white.iter().map(size).collect();
     let r = weigh(noise.apply(layout, &base.fit.residual));
     let k = all.len();
     // A little ridge, for tangents that are combinations of others.

@@ -211,6 +211,12 @@ pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -
     ]
 }
 
+/// Two signals multiplied, which may be the same.
+pub fn product((a, x): (&str, &[Vec<f64>]), (b, y): (&str, &[Vec<f64>])) -> Shape {
+    let text = if a == b { format!("{a}^2") } else { format!("{a}*{b}") };
+    Shape::new(text, Kind::Even, both(x, y, |x, y| x * y))
+}
+
 /// A factor of a product: how it is written, whether it is odd, and its values.
 type Factor<'f> = (String, bool, Box<dyn Fn(f64) -> f64 + 'f>);
 

@@ -31,10 +31,15 @@ pub fn signature(
     } else {
         "rate_dependent"
     };
+    // Of what the correction is made of: all functions of the time together see more than any law.
+    let of_time = |t: &Term| t.kind == Kind::Time;
+    let made_of =
+        |side: &str| chosen.iter().any(|&i| if of_time(&terms[i]) { side == "time" } else { terms[i].side == side });
     let side = ["plant", "input", "output"]
         .into_iter()
-        .map(|s| (s, family(&|t| t.side == s && t.kind != Kind::Time)))
-        .chain([("time", family(&|t| t.kind == Kind::Time))])
+        .map(|s| (s, family(&|t| t.side == s && !of_time(t))))
+        .chain([("time", family(&of_time))])
+        .filter(|(side, _)| made_of(side))
         .fold(("plant", f64::NEG_INFINITY), |best, x| if x.1 > best.1 { x } else { best })
         .0;
     let energy = |wanted: &dyn Fn(Kind) -> bool| -> f64 {

@@ -105,7 +105,12 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         places.push((Place::Output(i), label, if simulation.is_static() { "plant" } else { "output" }, coordinates));
     }
     let mut work: Vec<Signal> = Vec::new();
-    for (place, label, side, coordinates) in places {
+    for (place, label, side, mut coordinates) in places {
+        let own = coordinates.len();
+        if let (Place::State(_), "plant") = (place, side) {
+            let others = others(simulation, &coordinates);
+            coordinates.extend(others.into_iter().map(|s| (s.to_owned(), Expr::symbol(s), false)));
+        }
         let mut expressions: Vec<Expr> = coordinates.iter().map(|c| c.1.clone()).collect();
         let plant = side == "plant";
         let inputs = if plant && !simulation.is_static() { simulation.inputs.as_slice() } else { &[] };
@@ -128,7 +133,12 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             })
             .collect();
         let mut found: Vec<Shape> = Vec::new();
-        for ((name, _, velocity), x) in coordinates.iter().zip(&series) {
+        let named = |i: usize| (coordinates[i].0.as_str(), series[i].as_slice());
+        for other in own..coordinates.len() {
+            found.extend((0..=other).map(|i| shapes::product(named(i), named(other))));
+            found.extend(inputs.iter().map(|(u, input)| shapes::product((u, input), named(other))));
+        }
+        for ((name, _, velocity), x) in coordinates[..own].iter().zip(&series) {
             found.extend(shapes::curves(name, x, *velocity));
             if plant {
                 if !velocity {
@@ -141,7 +151,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
                 found.extend(shapes::driven((u, input), (name, x)));
             }
         }
-        if let ([(a, _, _), (b, _, _)], [x, v], true) = (coordinates.as_slice(), series.as_slice(), plant) {
+        if let ([(a, _, _), (b, _, _)], [x, v], true) = (&coordinates[..own], &series[..own], plant) {
             found.extend(shapes::surface((a, x), (b, v), radians));
         }
         work.extend(found.into_iter().map(|Shape { text, kind, series }| Signal {
@@ -176,6 +186,17 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             Some(Term { text, coordinates, place, kind, side, slot, column })
         })
         .collect()
+}
+
+/// Most states of other parts in whose products a slot's correction may be written.
+const OTHERS: usize = 6;
+
+/// The states that none of a slot's own coordinates is made of: what moves elsewhere acts through products (a swing's centrifugal force, a field's
+/// pull); in proportion it is a matter of the simulation's own parameters.
+fn others<'s>(simulation: &'s Simulation, own: &[(String, Expr, bool)]) -> Vec<&'s str> {
+    let known: Vec<String> = own.iter().flat_map(|(_, meaning, _)| meaning.symbols()).collect();
+    let states = simulation.states.iter().map(|s| s.name.as_str());
+    states.filter(|name| known.iter().all(|k| k != name)).take(OTHERS).collect()
 }
 
 /// Places of states and of the outputs that measure their derivatives, with the multiples.
