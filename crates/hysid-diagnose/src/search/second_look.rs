@@ -51,7 +51,8 @@ impl<'d> Search<'_, 'd> {
     /// fitted to no worse than the simulation as it is.
     ///
     /// A ratio of evidences exceeds `x` by chance with a probability of at most `1/x` (Markov);
-    /// there are as many sets as can be made of the candidates. That the noise model is an estimate is allowed for by [`ODDS_AGAINST`], but not
+    /// there are as many sets as can be made of the candidates, and sets of one size that say nearly the same (a dead zone before or behind a valve)
+    /// stand together. That the noise model is an estimate is allowed for by [`ODDS_AGAINST`], but not
     /// where a set turns a coloured residual into a white one: there the simulation as it is has the best colour that could be found for it, and the set
     /// has none to choose.
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
@@ -77,7 +78,7 @@ impl<'d> Search<'_, 'd> {
         let odds = |h: &Hypothesis<'_>| if whitens(h) { 1.0 } else { ODDS_AGAINST };
         let bound = |h: &Hypothesis<'_>| odds(h) * sets(h) * (none - evidence(h)).exp();
         let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
-        let p = bound(best).min(1.0);
+        let p = together(fitted.iter().filter(|h| h.effects.len() == best.effects.len()).map(bound));
         (p < self.level() && self.holds_on_blocks(start, best)).then_some(p)
     }
 
@@ -161,4 +162,39 @@ impl<'d> Search<'_, 'd> {
 /// Whether some squared errors are less than others, in all.
 fn is_less(a: &[f64], b: &[f64]) -> bool {
     a.iter().sum::<f64>() < b.iter().sum::<f64>()
+}
+/// The bound that sets of one size make together, each of them bounded for the number of sets there are: the mean of their ratios of evidence, those
+/// that were not fitted for nothing, has an expectation of one at most where nothing is missing, as each of them has.
+fn together(bounds: impl Iterator<Item = f64>) -> f64 {
+    bounds.map(|b| 1.0 / b.max(f64::MIN_POSITIVE)).fold(0.0, |a: f64, b| a + b).recip().min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::together;
+    use crate::oscillator::normal;
+
+    #[test]
+    fn sets_that_say_the_same_stand_together() {
+        assert_eq!(together([0.02].into_iter()), 0.02);
+        assert!((together([0.02, 0.02].into_iter()) - 0.01).abs() < 1e-15);
+        assert_eq!(together(std::iter::empty()), 1.0);
+        assert!(together([1e-3, 1e9].into_iter()) <= 1e-3);
+    }
+
+    #[test]
+    fn what_they_bound_together_is_no_more_frequent_by_chance() {
+        // Four shifts of a normal variable by nearly the same, where there is none.
+        let shifts = [2.0, 2.1, 2.2, 2.3];
+        let mut random = normal(7);
+        let draws = 20_000;
+        for level in [0.1, 0.03] {
+            let below = |x: f64| {
+                let bounds = shifts.iter().map(|m| shifts.len() as f64 * (0.5 * m * m - m * x).exp());
+                together(bounds) < level
+            };
+            let share = (0..draws).filter(|_| below(random())).count() as f64 / f64::from(draws);
+            assert!(share < level && share > 0.0, "{share} at {level}");
+        }
+    }
 }
