@@ -22,6 +22,7 @@ use crate::model::hold::free_run;
 use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
+use crate::search::profile::centre_moments;
 use crate::text::number;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
@@ -72,7 +73,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     notes.extend(fresh);
     (hooks.accepted)();
     setting.own_unknowns = base.model.count();
-    let found = explore(&setting, base, request, hooks, LESSONS);
+    let mut found = explore(&setting, base, request, hooks, LESSONS);
+    let most = found.pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    for h in found.pool.iter_mut().filter(|h| h.log_evidence > most - COULD_STAND) {
+        centre_moments(&found.search.setting, h);
+    }
     notes.extend(found.notes.iter().cloned());
     notes.extend(answers(&found.pool, request.questions));
 
@@ -150,6 +155,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     });
     Ok(Diagnosis { file, baseline, augmented, picture })
 }
+
+/// Log evidence by which a set may trail the best one and still come to be told or written.
+const COULD_STAND: f64 = 10.0;
 
 /// What is stated of the mismatch: where it is, what is missing, what else it could be, and what would tell.
 fn statement(

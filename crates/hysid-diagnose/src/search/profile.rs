@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::budget::Step;
 use crate::evidence::{Projector, norm2};
-use crate::mechanism::Shape;
+use crate::mechanism::{Places, Shape};
 use crate::model::Model;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Setting};
@@ -27,6 +27,9 @@ const ROUNDS: usize = 2;
 const ITERATIONS: usize = 3;
 /// Log likelihood that a move must bring.
 const LEAST: f64 = 1e-3;
+/// Moments between the ends of a recording at which it is asked whether one says as much as another, and the log likelihood within which it does.
+const MOMENTS: usize = 200;
+const AS_GOOD: f64 = 0.05;
 
 /// Moves the shapes of a set's `index`-th effect that least squares cannot move to where the error is least in their neighbourhood.
 pub fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usize) {
@@ -49,6 +52,40 @@ pub fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: 
             }
         }
     }
+}
+
+/// Puts the moments of a set's effects into the middle of the time in which they could as well be. To be done last: a fit goes on from anywhere in it.
+pub fn centre_moments<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>) {
+    let shapes = h.effects.iter().flat_map(|e| &e.written.shapes).filter(|s| s.places == Places::Moments);
+    for shape in shapes.cloned().collect::<Vec<_>>() {
+        if let Some(centred) = centred(setting, &h.base, &shape) {
+            h.base = centred;
+        }
+    }
+}
+
+/// The fit with a moment in that middle, where that is more than a step: while the machine stands still nothing
+/// tells when its damping changed, and another recording moves on at another time.
+fn centred<'d>(setting: &Setting<'d>, base: &Base<'d>, shape: &Shape) -> Option<Base<'d>> {
+    let error = Profile::of(setting, base, shape)?;
+    let step = (error.bounds.1 - error.bounds.0) / MOMENTS as f64;
+    let as_good = |at: &(f64, f64), now: f64| at.1 <= now + 2.0 * AS_GOOD;
+    let now = *error.at(&[error.here]).first()?;
+    if !error.around(error.here, step, 1).iter().any(|at| at.0 != error.here && as_good(at, now)) {
+        return None;
+    }
+    let all = error.around(error.here, step, MOMENTS);
+    let (before, after): (Vec<_>, Vec<_>) = all.into_iter().partition(|at| at.0 < error.here);
+    let first = before.iter().rev().take_while(|at| as_good(at, now)).last().map_or(error.here, |at| at.0);
+    let last = after.iter().take_while(|at| as_good(at, now)).last().map_or(error.here, |at| at.0);
+    let middle = 0.5 * (first + last);
+    if (middle - error.here).abs() < step {
+        return None;
+    }
+    let mut from = base.values();
+    from.parameters.insert(shape.name.clone(), middle);
+    let fitted = setting.fit(base.model.simulation(), &from, Some(&base.whitener), 1, 0)?;
+    (fitted.log_likelihood > base.log_likelihood - 2.0 * AS_GOOD).then_some(fitted)
 }
 
 /// Values of the shape at which the error is least, and less than where it stands; none where it cannot be told.
@@ -195,5 +232,43 @@ mod tests {
             let found = h.base.values().parameters[&shape.name];
             assert!((found - knee).abs() < 0.01 && h.base.log_likelihood > before, "{found}, from {away}");
         });
+    }
+
+    /// The damping changes while the oscillator stands still: the time between the last swing before and the first one after is found by brute force.
+    #[test]
+    fn a_moment_at_rest_lies_in_the_middle_of_the_rest() {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut random = normal(6);
+        let rest = 300..1500;
+        let mut u = drive(1900, &mut random);
+        u[rest.clone()].fill(0.0);
+        let (steps, (_, c, _)) = (std::cell::Cell::new(0u32), REAL);
+        let changes = f64::from(1450u32) * PERIOD;
+        let mut y = respond(&u, REAL, |_, v| {
+            let t = f64::from(steps.replace(steps.get() + 1)) * PERIOD / 40.0;
+            if t > changes { 1.5 * c * v } else { 0.0 }
+        });
+        let noise = 0.01 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * random());
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let at_c = |m: &crate::mechanism::Mechanism, s: &crate::slot::Slot| {
+            m.id == "abrupt_change" && s.label == "parameter:c"
+        };
+        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &at_c);
+        let mut h = refit(&setting, &none, &found[0]).unwrap();
+        centre_moments(&setting, &mut h);
+        let shape = h.effects[0].written.shapes.iter().find(|s| s.places == Places::Moments).unwrap();
+        let profile = Profile::of(&setting, &h.base, shape).unwrap();
+        let moments: Vec<f64> = (0..3800).map(|n| 0.5 * f64::from(n) * PERIOD).collect();
+        let errors = profile.at(&moments);
+        let here = moments.iter().position(|t| *t >= profile.here).unwrap();
+        let as_good = |n: &usize| errors[*n] <= errors[here] + 2.0 * AS_GOOD;
+        let first = moments[(0..=here).rev().take_while(as_good).last().unwrap()];
+        let last = moments[(here..moments.len()).take_while(as_good).last().unwrap()];
+        assert!(last - first > 50.0 * PERIOD && last < 1505.0 * PERIOD, "{first} to {last}");
+        let middle = 0.5 * (first + last);
+        assert!((profile.here - middle).abs() < 0.1 * (last - first), "{} of {first} to {last}", profile.here);
     }
 }
