@@ -120,15 +120,15 @@ impl Moves {
 fn surrogate(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> Vec<f64> {
     let mut rng = generator(seed, 0x5u64 << 56 | index);
     let mut out = vec![0.0; r.len()];
-    let mut drawn: Vec<((usize, usize, usize), Moves)> = Vec::new();
+    let mut moves: Vec<((usize, usize, usize), Moves)> = Vec::new();
     for s in &layout.series {
         let run = (s.stretch, s.first, s.rows.len());
-        let known = drawn.iter().position(|(of, _)| *of == run);
+        let known = moves.iter().position(|(of, _)| *of == run);
         let place = known.unwrap_or_else(|| {
-            drawn.push((run, Moves::drawn(s.rows.len(), tau, &mut rng)));
-            drawn.len() - 1
+            moves.push((run, Moves::drawn(s.rows.len(), tau, &mut rng)));
+            moves.len() - 1
         });
-        let moved = drawn[place].1.of(&r[s.rows.clone()]);
+        let moved = moves[place].1.of(&r[s.rows.clone()]);
         out[s.rows.clone()].iter_mut().zip(moved).for_each(|(o, v)| *o = v);
     }
     out

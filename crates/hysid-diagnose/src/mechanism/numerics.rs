@@ -84,9 +84,8 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
         (other != *simulation).then_some(other)
     };
     // However sharp a smoothed law is, it creeps where the machine sticks, and the sharper it is, the more steps it needs.
-    let (sticks, sharper) = (sharpened(true), sharpened(false));
-    for (what, other) in [(STICKS, sticks), (SHARPER, sharper)] {
-        found.extend(other.map(|simulation| Variant { what, simulation }));
+    for (what, sticks) in [(STICKS, true), (SHARPER, false)] {
+        found.extend(sharpened(sticks).map(|simulation| Variant { what, simulation }));
     }
     found
 }

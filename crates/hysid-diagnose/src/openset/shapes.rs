@@ -206,7 +206,7 @@ pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
 /// A coordinate with a coefficient that follows an input or its size.
 pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 2] {
     [
-        Shape::new(format!("{u}*{name}"), Kind::Even, both(input, x, |u, x| u * x)),
+        product((u, input), (name, x)),
         Shape::new(format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)),
     ]
 }

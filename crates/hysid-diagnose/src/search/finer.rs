@@ -67,13 +67,11 @@ pub fn finer<'d>(
 /// tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would pass for
 /// another effect.
 fn preferred(merits: &[(f64, f64)], plain: bool) -> Option<usize> {
-    let most = |among: &mut dyn Iterator<Item = usize>, merit: fn(&(f64, f64)) -> f64| {
-        among.max_by(|&a, &b| merit(&merits[a]).total_cmp(&merit(&merits[b])))
-    };
-    let top = most(&mut (0..merits.len()), |m| m.0)?;
-    let ties = |i: &usize| plain && merits[*i].0 >= merits[top].0 - TIE;
-    let closest = most(&mut (0..merits.len()).filter(ties), |m| m.1);
-    closest.filter(|&i| merits[i].1 > merits[top].1 + LESS_LEFT).or(Some(top))
+    let top = (0..merits.len()).max_by(|&a, &b| merits[a].0.total_cmp(&merits[b].0))?;
+    let (evidence, likelihood) = merits[top];
+    let leaves_less = |i: &usize| merits[*i].0 >= evidence - TIE && merits[*i].1 > likelihood + LESS_LEFT;
+    let closer = (0..merits.len()).filter(|i| plain && leaves_less(i));
+    closer.max_by(|&a, &b| merits[a].1.total_cmp(&merits[b].1)).or(Some(top))
 }
 
 /// What a law asks of the recording.

@@ -69,15 +69,15 @@ pub fn centre_moments<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>) {
 fn centred<'d>(setting: &Setting<'d>, base: &Base<'d>, shape: &Shape) -> Option<Base<'d>> {
     let error = Profile::of(setting, base, shape)?;
     let step = (error.bounds.1 - error.bounds.0) / MOMENTS as f64;
-    let as_good = |at: &(f64, f64), now: f64| at.1 <= now + 2.0 * AS_GOOD;
     let now = *error.at(&[error.here]).first()?;
-    if !error.around(error.here, step, 1).iter().any(|at| at.0 != error.here && as_good(at, now)) {
+    let as_good = |at: &&(f64, f64)| at.1 <= now + 2.0 * AS_GOOD;
+    if !error.around(error.here, step, 1).iter().any(|at| at.0 != error.here && as_good(&at)) {
         return None;
     }
     let all = error.around(error.here, step, MOMENTS);
     let (before, after): (Vec<_>, Vec<_>) = all.into_iter().partition(|at| at.0 < error.here);
-    let first = before.iter().rev().take_while(|at| as_good(at, now)).last().map_or(error.here, |at| at.0);
-    let last = after.iter().take_while(|at| as_good(at, now)).last().map_or(error.here, |at| at.0);
+    let first = before.iter().rev().take_while(as_good).last().map_or(error.here, |at| at.0);
+    let last = after.iter().take_while(as_good).last().map_or(error.here, |at| at.0);
     let middle = 0.5 * (first + last);
     if (middle - error.here).abs() < step {
         return None;

@@ -31,9 +31,17 @@ pub use find::Structure;
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
 
-/// Smoothed signs of a velocity that a simulation may have in the place of the sharp one.
-const SMOOTH_SIGNS: [&str; 7] =
-    ["tanh(v/P)", "tanh(P*v)", "atan(v/P)", "atan(P*v)", "v/(abs(v) + P)", "v/sqrt(v^2 + P)", "v/sqrt(v*v + P)"];
+/// Signs of a velocity that a simulation may have: the sharp one, then the smoothed ones that may stand in its place.
+pub(crate) const SIGNS: [&str; 8] = [
+    "sign(v)",
+    "tanh(v/P)",
+    "tanh(P*v)",
+    "atan(v/P)",
+    "atan(P*v)",
+    "v/(abs(v) + P)",
+    "v/sqrt(v^2 + P)",
+    "v/sqrt(v*v + P)",
+];
 
 /// What a smoothed sign of this form comes to at large velocities.
 fn reach(form: &Expr) -> Expr {
@@ -271,22 +279,24 @@ impl Slot {
 
     /// Offers the sign of the velocity as the equations here smooth it, where they do: friction that sticks beside one that creeps is another machine.
     fn offer_own_sign(&mut self, simulation: &Simulation) {
-        let Some(form) = self.smooth_sign() else { return };
-        if let Some(part) = self.context.iter().find_map(|e| pattern::part(&form, e)) {
+        if let Some((form, part)) = self.smooth_sign() {
             self.offer(simulation, "own_sign", (part / reach(&form)).simplified());
         }
     }
 
-    /// The form in which the equations here smooth the sign of the velocity, if they do.
-    fn smooth_sign(&self) -> Option<Expr> {
+    /// The form in which the equations here smooth the sign of the velocity, if they do, with the part that has it.
+    fn smooth_sign(&self) -> Option<(Expr, Expr)> {
         let symbol = |s: &str| self.symbols.get(s).map(|q| q.expression.clone());
-        let forms = SMOOTH_SIGNS.iter().filter_map(|form| pattern::prepare(form, symbol));
-        forms.into_iter().find(|form| self.context.iter().any(|e| pattern::part(form, e).is_some()))
+        let mut forms = SIGNS[1..].iter().filter_map(|form| pattern::prepare(form, symbol));
+        forms.find_map(|form| {
+            let part = self.context.iter().find_map(|e| pattern::part(&form, e))?;
+            Some((form, part))
+        })
     }
 
     /// An equation with the smoothed sign of the velocity replaced: three times as sharp, or one that sticks. As it is where it holds none.
     pub(crate) fn sharpened(&self, equation: &Expr, sticks: bool) -> Expr {
-        let (Some(form), Some(v)) = (self.smooth_sign(), self.quantity("v").map(|q| &q.expression)) else {
+        let (Some((form, _)), Some(v)) = (self.smooth_sign(), self.quantity("v").map(|q| &q.expression)) else {
             return equation.clone();
         };
         pattern::replaced(&form, equation, &|part| {

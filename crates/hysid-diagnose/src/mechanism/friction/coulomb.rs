@@ -1,7 +1,7 @@
 //! Dry friction of constant size that opposes the motion.
 
 use crate::mechanism::{Block, Family, Law, Mechanism, Need};
-use crate::slot::Place;
+use crate::slot::{Place, SIGNS};
 
 /// Dry friction of constant size that opposes the motion.
 pub static COULOMB_FRICTION: Mechanism = Mechanism {
@@ -10,7 +10,7 @@ pub static COULOMB_FRICTION: Mechanism = Mechanism {
     block: Block::Damping,
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("v"),
-    already: &["sign(v)", "tanh(v/P)", "tanh(P*v)", "atan(v/P)", "atan(P*v)", "v/(abs(v) + P)", "v/sqrt(v^2 + P)"],
+    already: &SIGNS,
     law: |_, _| Law::force("F_c*sign(v)").amplitude("F_c", "F", 0.0, 1.0),
     contains: &[],
     confusable: &["stribeck_friction", "dahl_friction", "dead_zone", "displacement_dependent_damping"],
