@@ -22,7 +22,7 @@ use crate::model::hold::free_run;
 use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
-use crate::search::profile::centre_moments;
+use crate::search::profile::{centre_moments, take_intervals};
 use crate::text::number;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
@@ -83,6 +83,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
 
     (hooks.progress)("weighing the evidence");
     let mut judged = Judgement::of(&found);
+    take_intervals(&mut found.pool[judged.told]);
     let mut file = statement(request, &found, &judged, notes, hooks);
 
     let Written { set, modelled } = written(&found, &mut judged, &mut file, hooks);

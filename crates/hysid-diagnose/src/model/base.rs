@@ -1,5 +1,7 @@
 //! A calibrated simulation and its evidence space: what later steps look at and build upon.
 
+use std::collections::BTreeMap;
+
 use hysid_plant::Simulation;
 
 use super::force::force_paths;
@@ -70,6 +72,8 @@ pub struct Base<'d> {
     pub share: f64,
     /// Log likelihood of the residual under that noise, less half of `ln n` for each coefficient of the noise model.
     pub log_likelihood: f64,
+    /// 95 % intervals of parameters that were profiled, by name: they stand in the place of those that the tangents tell.
+    pub profiled: BTreeMap<String, [f64; 2]>,
 }
 
 /// A fitted parameter and how well it is known.
@@ -117,7 +121,7 @@ pub fn fit_simulation<'d>(
     let data = model.data();
     let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
     let mut noise = match whitener {
-        Some(w) if kind == NoiseKind::Coloured || w.order() == 0 => w.clone(),
+        Some(w) if kind == NoiseKind::Coloured || w.coefficients() == 0 => w.clone(),
         _ => data.layout.fit_noise(&data.about_means(), 0, &[]),
     };
     let mut fit: Option<Fit> = None;
@@ -139,7 +143,7 @@ pub fn fit_simulation<'d>(
     }
     let fit = fit?;
     let log_likelihood = kind.share() * log_likelihood(data, &noise, &fit.residual);
-    Some(Base { model, fit, whitener: noise, paths, share: kind.share(), log_likelihood })
+    Some(Base { model, fit, whitener: noise, paths, share: kind.share(), log_likelihood, profiled: BTreeMap::new() })
 }
 
 /// Log likelihood of a residual under a noise model, up to a constant of the data set.
@@ -247,7 +251,7 @@ impl Base<'_> {
                 let variance = covariance[i + k * i];
                 let half = 1.96 * variance.sqrt();
                 let within = || [(value - half).max(bounds[i].0), (value + half).min(bounds[i].1)];
-                let ends = (variance > 0.0).then(within);
+                let ends = self.profiled.get(&name).copied().or_else(|| (variance > 0.0).then(within));
                 Some(Interval { name, value, ends, at_bound: self.fit.at_bound[i] })
             })
             .collect()
@@ -255,11 +259,15 @@ impl Base<'_> {
 
     /// Covariance of the unknowns, column-major.
     pub fn covariance(&self) -> Vec<f64> {
+        self.fit.covariance(&self.model.data().layout, &self.whitener, None, self.variance())
+    }
+
+    /// Sum of squares of the whitened residual for each independent row that is left: by how much it rises for one standard deviation of an unknown.
+    pub fn variance(&self) -> f64 {
         let data = self.model.data();
         let white = self.whitener.apply(&data.layout, &self.fit.residual);
         let witnesses = self.share * data.rows().saturating_sub(self.fit.theta.len()).max(1) as f64;
-        let variance = norm2(&white) / witnesses;
-        self.fit.covariance(&data.layout, &self.whitener, None, variance)
+        norm2(&white) / witnesses
     }
 }
 

@@ -30,6 +30,11 @@ const LEAST: f64 = 1e-3;
 /// Moments between the ends of a recording at which it is asked whether one says as much as another, and the log likelihood within which it does.
 const MOMENTS: usize = 200;
 const AS_GOOD: f64 = 0.05;
+/// Standard deviations of a 95 % interval; halvings of the way to a bound that are looked at, and cuts of the one in which the interval ends, each into so many parts.
+const QUANTILE: f64 = 1.96;
+const HALVINGS: i32 = 24;
+const CUTS: usize = 3;
+const PARTS: u32 = 8;
 
 /// Moves the shapes of a set's `index`-th effect that least squares cannot move to where the error is least in their neighbourhood.
 pub fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: usize) {
@@ -40,7 +45,7 @@ pub fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: 
             if setting.budget.omits(Step::Fits) {
                 return;
             }
-            let fitted = lowest(setting, &h.base, shape).into_par_iter().filter_map(|value| {
+            let fitted = lowest(&h.base, shape).into_par_iter().filter_map(|value| {
                 let mut from = h.base.values();
                 from.parameters.insert(shape.name.clone(), value);
                 setting.fit(h.base.model.simulation(), &from, Some(&h.base.whitener), 1, ITERATIONS)
@@ -64,10 +69,48 @@ pub fn centre_moments<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>) {
     }
 }
 
+/// Takes the 95 % intervals of shapes that least squares cannot move by the profile of the error (a likelihood ratio): the tangents at one place tell nothing of how far a
+/// moment or a knee may lie, and at a moment between two samples they are zero.
+pub fn take_intervals(h: &mut Hypothesis<'_>) {
+    let shapes = h.effects.iter().flat_map(|e| &e.written.shapes);
+    let shapes = shapes.filter(|s| s.searched || s.places == Places::Moments);
+    let found: Vec<(String, [f64; 2])> =
+        shapes.filter_map(|shape| Some((shape.name.clone(), interval(&h.base, shape)?))).collect();
+    h.base.profiled.extend(found);
+}
+
+/// Where the profile of the error has risen by what one unknown does with a probability of 5 %, on either side of where the shape stands; the bound where it does
+/// not rise so far.
+fn interval(base: &Base<'_>, shape: &Shape) -> Option<[f64; 2]> {
+    let error = Profile::of(base, shape)?;
+    let here = error.here;
+    let within = error.at(&[here]).first()? + QUANTILE.powi(2) * base.variance();
+    let side = |bound: f64| {
+        let place = |share: f64| here + share * (bound - here);
+        // The first share of the way at which the error is too large, from the least on; and the last before it.
+        let crossing = |shares: &[f64]| {
+            let errors = error.at(&shares.iter().map(|s| place(*s)).collect::<Vec<_>>());
+            errors.iter().position(|e| *e > within)
+        };
+        let halvings: Vec<f64> = (0..=HALVINGS).rev().map(|k| 0.5_f64.powi(k)).collect();
+        let Some(first) = crossing(&halvings) else { return bound };
+        let (mut inside, mut outside) = (if first > 0 { halvings[first - 1] } else { 0.0 }, halvings[first]);
+        for _ in 0..CUTS {
+            let cuts: Vec<f64> =
+                (1..PARTS).map(|i| inside + (outside - inside) * f64::from(i) / f64::from(PARTS)).collect();
+            let next = crossing(&cuts);
+            outside = next.map_or(outside, |i| cuts[i]);
+            inside = next.map_or(cuts.last().copied(), |i| i.checked_sub(1).map(|i| cuts[i])).unwrap_or(inside);
+        }
+        place(0.5 * (inside + outside))
+    };
+    Some([side(error.bounds.0), side(error.bounds.1)])
+}
+
 /// The fit with a moment in that middle, where that is more than a step: while the machine stands still nothing
 /// tells when its damping changed, and another recording moves on at another time.
 fn centred<'d>(setting: &Setting<'d>, base: &Base<'d>, shape: &Shape) -> Option<Base<'d>> {
-    let error = Profile::of(setting, base, shape)?;
+    let error = Profile::of(base, shape)?;
     let step = (error.bounds.1 - error.bounds.0) / MOMENTS as f64;
     let now = *error.at(&[error.here]).first()?;
     let as_good = |at: &&(f64, f64)| at.1 <= now + 2.0 * AS_GOOD;
@@ -89,8 +132,8 @@ fn centred<'d>(setting: &Setting<'d>, base: &Base<'d>, shape: &Shape) -> Option<
 }
 
 /// Values of the shape at which the error is least, and less than where it stands; none where it cannot be told.
-fn lowest(setting: &Setting<'_>, base: &Base<'_>, shape: &Shape) -> Vec<f64> {
-    let Some(error) = Profile::of(setting, base, shape) else { return Vec::new() };
+fn lowest(base: &Base<'_>, shape: &Shape) -> Vec<f64> {
+    let Some(error) = Profile::of(base, shape) else { return Vec::new() };
     let here = error.here;
     let Some(&now) = error.at(&[here]).first() else { return Vec::new() };
     let step = shape.spacing(here) / ASIDE as f64;
@@ -128,14 +171,14 @@ struct Profile<'a, 'd> {
 }
 
 impl<'a, 'd> Profile<'a, 'd> {
-    fn of(setting: &Setting<'d>, base: &'a Base<'d>, shape: &'a Shape) -> Option<Self> {
+    fn of(base: &'a Base<'d>, shape: &'a Shape) -> Option<Self> {
         let mut document = base.model.simulation().clone();
         let parameter = document.parameter_mut(&shape.name)?;
         let bounds = (parameter.lower(), parameter.upper());
         parameter.fixed = true;
-        let model = Model::new(&document, setting.data, setting.substeps).ok()?;
+        let model = Model::new(&document, base.model.data(), base.model.substeps()).ok()?;
         let place = base.model.place_of(&shape.name)?;
-        let layout = &setting.data.layout;
+        let layout = &base.model.data().layout;
         let columns = base.fit.jacobian.iter().enumerate().filter(|(i, _)| *i != place);
         let others = Projector::new(columns.map(|(_, c)| base.whitener.apply(layout, c)));
         Some(Self { base, model, name: &shape.name, here: base.fit.theta[place], bounds, others })
@@ -195,24 +238,47 @@ mod tests {
         check(&setting, &none, &found[0]);
     }
 
+    /// The fit of all other unknowns beside a shape that is held.
+    fn held_at<'d>(setting: &Setting<'d>, h: &Hypothesis<'d>, shape: &Shape, value: f64) -> Base<'d> {
+        let mut held = h.base.model.simulation().clone();
+        held.parameter_mut(&shape.name).unwrap().fixed = true;
+        held.parameter_mut(&shape.name).unwrap().value = value;
+        let mut from = h.base.values();
+        from.parameters.insert(shape.name.clone(), value);
+        setting.fit(&held, &from, Some(&h.base.whitener), 1, 30).unwrap()
+    }
+
     /// Beside a fit of all the others with the shape held, iterated to its end; far from where the shape stands their tangents no longer hold.
     #[test]
     fn the_profile_is_the_error_with_the_others_refitted() {
         with_a_knee(0.08, |setting, none, candidate| {
             let h = refit(setting, none, candidate).unwrap();
             let shape = &h.effects[0].written.shapes[0];
-            let profile = Profile::of(setting, &h.base, shape).unwrap();
+            let profile = Profile::of(&h.base, shape).unwrap();
             let step = 0.03 * shape.spacing(profile.here);
             for value in [profile.here, profile.here - step, profile.here + step] {
-                let mut held = h.base.model.simulation().clone();
-                held.parameter_mut(&shape.name).unwrap().fixed = true;
-                held.parameter_mut(&shape.name).unwrap().value = value;
-                let mut from = h.base.values();
-                from.parameters.insert(shape.name.clone(), value);
-                let fitted = setting.fit(&held, &from, Some(&h.base.whitener), 1, 30).unwrap();
+                let fitted = held_at(setting, &h, shape, value);
                 let white = h.base.whitener.apply(&setting.data.layout, &fitted.fit.residual);
                 let (exact, found) = (norm2(&white), profile.at(&[value])[0]);
                 assert!((found / exact - 1.0).abs() < 0.01, "{value}: {found} for {exact}");
+            }
+        });
+    }
+
+    #[test]
+    fn an_interval_ends_where_the_likelihood_of_a_refit_has_fallen_by_its_quantile() {
+        with_a_knee(0.08, |setting, none, candidate| {
+            let mut h = refit(setting, none, candidate).unwrap();
+            take_intervals(&mut h);
+            let shape = &h.effects[0].written.shapes[0];
+            let told = h.base.intervals().into_iter().find(|i| i.name == shape.name).unwrap();
+            let ends = told.ends.unwrap();
+            assert!(ends[0] < told.value && told.value < ends[1] && (ends[1] - ends[0]) < 0.02, "{told:?}");
+            for end in ends {
+                let fitted = held_at(setting, &h, shape, end);
+                let white = |b: &Base<'_>| norm2(&h.base.whitener.apply(&setting.data.layout, &b.fit.residual));
+                let rise = (white(&fitted) - white(&h.base)) / h.base.variance();
+                assert!((rise / QUANTILE.powi(2) - 1.0).abs() < 0.1, "{end}: {rise}");
             }
         });
     }
@@ -260,7 +326,7 @@ mod tests {
         let mut h = refit(&setting, &none, &found[0]).unwrap();
         centre_moments(&setting, &mut h);
         let shape = h.effects[0].written.shapes.iter().find(|s| s.places == Places::Moments).unwrap();
-        let profile = Profile::of(&setting, &h.base, shape).unwrap();
+        let profile = Profile::of(&h.base, shape).unwrap();
         let moments: Vec<f64> = (0..3800).map(|n| 0.5 * f64::from(n) * PERIOD).collect();
         let errors = profile.at(&moments);
         let here = moments.iter().position(|t| *t >= profile.here).unwrap();
@@ -270,5 +336,15 @@ mod tests {
         assert!(last - first > 50.0 * PERIOD && last < 1505.0 * PERIOD, "{first} to {last}");
         let middle = 0.5 * (first + last);
         assert!((profile.here - middle).abs() < 0.1 * (last - first), "{} of {first} to {last}", profile.here);
+        // The tangents see nothing of it there; the interval is that of all moments at which the error is small enough.
+        let within = errors[here] + QUANTILE.powi(2) * h.base.variance();
+        let all: Vec<f64> = moments.iter().zip(&errors).filter(|(_, e)| **e <= within).map(|(t, _)| *t).collect();
+        let name = shape.name.clone();
+        take_intervals(&mut h);
+        let told = h.base.intervals().into_iter().find(|i| i.name == name).unwrap();
+        let [low, high] = told.ends.unwrap();
+        assert!(low < changes && changes < high, "{low} to {high}");
+        let off = |a: f64, b: Option<&f64>| (a - b.unwrap()).abs();
+        assert!(off(low, all.first()).max(off(high, all.last())) < PERIOD, "{low} to {high}, {all:?}");
     }
 }
