@@ -3,7 +3,7 @@
 use super::firmness::{firmness, likelihoods};
 use super::remaining::Remaining;
 use super::trifles::{Trifle, without_trifles};
-use super::veto::veto;
+use super::veto::{found_too_little, veto};
 use super::wanders::{Wanders, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
@@ -110,7 +110,8 @@ impl<'d> Judgement<'d> {
         let veto = match winner {
             0 => None,
             _ if runs_away => Some("what no free run can follow tells nothing of a set of effects"),
-            _ => veto(&pool[0], least, best, [&blocks[0], &blocks[winner]]),
+            _ => veto(&pool[0], least, best, [&blocks[0], &blocks[winner]])
+                .or_else(|| found_too_little(remaining.as_ref().filter(|_| unfinished()))),
         };
         if veto.is_some() {
             within = VerdictKind::Ambiguous;
