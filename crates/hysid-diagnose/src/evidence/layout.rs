@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::noise::NoiseModel;
 use super::response::ForcePath;
+use super::shared::Shared;
 
 /// A run of rows that follow each other in time: one output of one stretch, between gaps.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +17,13 @@ pub struct Series {
     pub first: usize,
     /// The rows in the stack; as many samples follow `first`.
     pub rows: Range<usize>,
+}
+
+impl Series {
+    /// Whether the other holds the same moments.
+    pub fn is_beside(&self, other: &Self) -> bool {
+        (self.stretch, self.first, self.rows.len()) == (other.stretch, other.first, other.rows.len())
+    }
 }
 
 /// The rows of a stack.
@@ -38,7 +46,8 @@ impl Layout {
         self.len() == 0
     }
 
-    /// One noise model for each output, fitted to this stacked residual; `paths[output]` are the ways of an unknown force to it, where there are any.
+    /// One noise model for each output, fitted to this stacked residual, with what they share (neither colour nor that for an order of 0); `paths[output]` are the
+    /// ways of an unknown force to it, where there are any.
     pub fn fit_noise(&self, residual: &[f64], max_order: usize, paths: &[Vec<ForcePath>]) -> Whitener {
         let models = (0..self.outputs)
             .map(|o| {
@@ -47,7 +56,9 @@ impl Layout {
                 NoiseModel::fit(&stretches, max_order, paths.get(o).map_or(&[], Vec::as_slice))
             })
             .collect();
-        Whitener { models }
+        let each = Whitener::of(models);
+        let shared = if max_order > 0 { Shared::of(self, &each.apply(self, residual)) } else { None };
+        Whitener { shared, ..each }
     }
 
     /// Root mean square of each output's rows of a stack.
@@ -65,14 +76,21 @@ impl Layout {
     }
 }
 
-/// The noise model of each output.
+/// The noise of the outputs: the model of each, and what they share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitener {
     /// In the order of the outputs.
     pub models: Vec<NoiseModel>,
+    /// What the whitened outputs still share.
+    shared: Option<Shared>,
 }
 
 impl Whitener {
+    /// Of outputs that share no noise.
+    pub fn of(models: Vec<NoiseModel>) -> Self {
+        Self { models, shared: None }
+    }
+
     /// The stack, each series whitened by its output's model.
     pub fn apply(&self, layout: &Layout, stack: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; stack.len()];
@@ -85,16 +103,41 @@ impl Whitener {
         for s in &layout.series {
             self.models[s.output].whiten(&stack[s.rows.clone()], &mut out[s.rows.clone()]);
         }
+        if let Some(shared) = &self.shared {
+            shared.take_out(layout, out);
+        }
+    }
+
+    /// Colours unit white noise in place: the inverse of [`Whitener::apply`].
+    pub fn colour(&self, layout: &Layout, stack: &mut [f64]) {
+        if let Some(shared) = &self.shared {
+            shared.put_in(layout, stack);
+        }
+        for s in &layout.series {
+            self.models[s.output].colour(&mut stack[s.rows.clone()]);
+        }
     }
 
     /// Sum over rows of the logarithm of the innovation's standard deviation: the determinant's share of a log likelihood.
     pub fn log_scale(&self, layout: &Layout) -> f64 {
-        layout.series.iter().map(|s| self.models[s.output].log_scale(s.rows.len())).sum()
+        layout.series.iter().map(|s| self.log_scale_of(layout, s)).sum()
+    }
+
+    /// The share that a series has in [`Whitener::log_scale`].
+    pub fn log_scale_of(&self, layout: &Layout, s: &Series) -> f64 {
+        let shared = self.shared.as_ref().map_or(0.0, |shared| shared.log_scale(layout, s));
+        self.models[s.output].log_scale(s.rows.len()) + s.rows.len() as f64 * shared
     }
 
     /// Number of coefficients beyond the scales.
     pub fn coefficients(&self) -> usize {
-        self.models.iter().map(NoiseModel::coefficients).sum()
+        let shared = self.shared.as_ref().map_or(0, Shared::coefficients);
+        self.models.iter().map(NoiseModel::coefficients).sum::<usize>() + shared
+    }
+
+    /// Whether each output's noise is white, whatever they share.
+    pub fn is_white(&self) -> bool {
+        self.models.iter().all(|m| m.coefficients() == 0)
     }
 
     /// The largest order.

@@ -20,6 +20,7 @@ mod quantile;
 mod response;
 mod score;
 mod shape;
+mod shared;
 mod surrogate;
 
 pub use blocks::{better_by_chance, difference};

@@ -138,7 +138,7 @@ mod tests {
 
     fn plain(n: usize) -> (Layout, Whitener) {
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        (layout, Whitener { models: vec![NoiseModel::white(1.0)] })
+        (layout, Whitener::of(vec![NoiseModel::white(1.0)]))
     }
 
     #[test]

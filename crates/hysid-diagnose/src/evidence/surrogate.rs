@@ -18,7 +18,7 @@ use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::layout::Layout;
+use super::layout::{Layout, Series};
 use super::projector::{Projector, norm2};
 use super::score::{FeatureGroup, score};
 use crate::random::generator;
@@ -120,12 +120,11 @@ impl Moves {
 fn surrogate(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> Vec<f64> {
     let mut rng = generator(seed, 0x5u64 << 56 | index);
     let mut out = vec![0.0; r.len()];
-    let mut moves: Vec<((usize, usize, usize), Moves)> = Vec::new();
+    let mut moves: Vec<(&Series, Moves)> = Vec::new();
     for s in &layout.series {
-        let run = (s.stretch, s.first, s.rows.len());
-        let known = moves.iter().position(|(of, _)| *of == run);
+        let known = moves.iter().position(|(of, _)| of.is_beside(s));
         let place = known.unwrap_or_else(|| {
-            moves.push((run, Moves::drawn(s.rows.len(), tau, &mut rng)));
+            moves.push((s, Moves::drawn(s.rows.len(), tau, &mut rng)));
             moves.len() - 1
         });
         let moved = moves[place].1.of(&r[s.rows.clone()]);
@@ -249,7 +248,7 @@ fn draw(some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync), statistic: f64, alpha: f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::{Series, Whitener};
+    use crate::evidence::Whitener;
 
     const N: usize = 1000;
 

@@ -104,7 +104,7 @@ pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<OnBlocks
     let scales = data.scales();
     let (mut score, mut squares) = (0.0, Vec::new());
     for s in &data.layout.series {
-        let scale = h.base.whitener.models[s.output].log_scale(s.rows.len()) / s.rows.len() as f64;
+        let scale = h.base.whitener.log_scale_of(&data.layout, s) / s.rows.len() as f64;
         for row in s.rows.clone().filter(|&row| weights[row] == 0.0) {
             score -= 0.5 * white[row] * white[row] + scale;
             squares.push((fit.residual[row] / scales[s.output]).powi(2));

@@ -113,7 +113,7 @@ mod tests {
         let more = Count { lasting: 6, passing: passing + 3 };
         assert_eq!(more.beyond(model.count()), Count { lasting: 2, passing: 3 });
         // At the true parameters nothing but the starts is wrong, and a fit that may move them leaves nothing.
-        let noise = Whitener { models: vec![NoiseModel::white(1.0)] };
+        let noise = Whitener::of(vec![NoiseModel::white(1.0)]);
         let start = model.theta(&Values::default());
         let left = |theta: &[f64]| norm2(&model.residual(theta).unwrap()) / norm2(&data.y);
         let fit = levenberg_marquardt(&model, &start, &data.layout, &noise, None, LmOptions::default()).unwrap();

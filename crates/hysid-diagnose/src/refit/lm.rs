@@ -319,7 +319,7 @@ mod tests {
         let n = 50;
         let problem = Decay { y: (0..n).map(|i| 3.0 * (-0.7 * i as f64 * 0.1).exp()).collect(), bounds };
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        let whitener = Whitener { models: vec![NoiseModel::white(0.1)] };
+        let whitener = Whitener::of(vec![NoiseModel::white(0.1)]);
         levenberg_marquardt(&problem, &start, &layout, &whitener, None, LmOptions::default()).unwrap()
     }
 
@@ -338,7 +338,7 @@ mod tests {
         let bounds = vec![(-100.0, 100.0), (-10.0, 10.0)];
         let problem = Decay { y: (0..n).map(|i| 3.0 * (-0.7 * i as f64 * 0.1).exp()).collect(), bounds };
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        let whitener = Whitener { models: vec![NoiseModel::white(0.1)] };
+        let whitener = Whitener::of(vec![NoiseModel::white(0.1)]);
         let weights: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i % 3 > 0))).collect();
         for iterations in [0, 2, 30] {
             let options = LmOptions { iterations, ..LmOptions::default() };
@@ -374,7 +374,7 @@ mod tests {
         let f = fit([1.0, 0.1], vec![(-100.0, 100.0), (-10.0, 10.0)]);
         let n = 50;
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        let whitener = Whitener { models: vec![NoiseModel::white(0.1)] };
+        let whitener = Whitener::of(vec![NoiseModel::white(0.1)]);
         let c = f.covariance(&layout, &whitener, None, 1.0);
         let (a, b) = (&f.jacobian[0], &f.jacobian[1]);
         let (aa, ab, bb) = (dot(a, a) / 0.01, dot(a, b) / 0.01, dot(b, b) / 0.01);

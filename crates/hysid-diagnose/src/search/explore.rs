@@ -94,7 +94,7 @@ pub fn explore<'a, 'd>(
     let shown = test.p_value < options.alpha;
     let mut significant = shown;
     // A slight colour matters where nothing is seen under it.
-    let colour = none.base.coloured() || none.base.driven() || (!significant && none.base.whitener.coefficients() > 0);
+    let colour = none.base.coloured() || none.base.driven() || (!significant && !none.base.whitener.is_white());
     let heard = murky || (colour && !setting.budget.omits(Step::OtherNoise));
     let plain_start = if heard { plainly.start(&none) } else { None };
     let (mut gross, under_white) = if murky { (plain_start, None) } else { (None, plain_start) };

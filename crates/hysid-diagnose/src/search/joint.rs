@@ -166,7 +166,7 @@ mod tests {
     fn group(columns: &[Vec<f64>]) -> FeatureGroup {
         let n = columns[0].len();
         let layout = Layout { series: vec![Series { stretch: 0, output: 0, first: 0, rows: 0..n }], outputs: 1 };
-        let whitener = Whitener { models: vec![NoiseModel::white(1.0)] };
+        let whitener = Whitener::of(vec![NoiseModel::white(1.0)]);
         FeatureGroup::new(columns, &layout, &whitener, &Projector::default()).unwrap()
     }
 

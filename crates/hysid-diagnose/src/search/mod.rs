@@ -237,7 +237,7 @@ impl<'a, 'd> Search<'a, 'd> {
     /// predicts the others, and under it their scores are nothing. Fitted beside the effects, each with a noise model of its own, the evidence tells
     /// which it is.
     fn absorbed(&self, h: &Hypothesis<'d>) -> Vec<Candidate> {
-        if h.base.whitener.coefficients() == 0 || self.setting.budget.omits(Step::OtherNoise) {
+        if h.base.whitener.is_white() || self.setting.budget.omits(Step::OtherNoise) {
             return Vec::new();
         }
         let plain = Setting { noise: NoiseKind::White(1.0), ..self.setting.clone() };
@@ -271,7 +271,7 @@ impl<'a, 'd> Search<'a, 'd> {
             return surrogate_test(&groups, layout, &own, &r, options);
         }
         // A score is twice a gain in log likelihood.
-        let handicap = if base.whitener.coefficients() > 0 { 2.0 * SLOW } else { 0.0 };
+        let handicap = if base.whitener.is_white() { 0.0 } else { 2.0 * SLOW };
         let quick = groups_of(false).map(|group| Contender { group, handicap: 0.0 });
         let groups: Vec<Contender<'_>> =
             quick.chain(groups_of(true).map(|group| Contender { group, handicap })).collect();

@@ -114,9 +114,7 @@ fn rehearsed(none: &Base<'_>, answer: &[f64], white: &[f64], seed: u64, index: u
             if rng.random::<bool>() { w } else { -w }
         })
         .collect();
-    for s in &data.layout.series {
-        none.whitener.models[s.output].colour(&mut noise[s.rows.clone()]);
-    }
+    none.whitener.colour(&data.layout, &mut noise);
     let y = answer.iter().zip(&noise).map(|(y, e)| y + e).collect();
     (data.with_outputs(y), noise)
 }
@@ -234,7 +232,7 @@ mod tests {
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, data, NoiseKind::Coloured, &budget);
-        assert!(none.base.whitener.coefficients() > 0);
+        assert!(!none.base.whitener.is_white());
         let candidates = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|_, _| true);
         by_rehearsal(&setting, &none, &candidates, None, 0.005, 1)
     }

@@ -65,7 +65,7 @@ impl<'d> Search<'_, 'd> {
         };
         // A set that leaves white noise has no colour left to choose: it need not allow for those that noise may have.
         let spared_by = |h: &Hypothesis<'_>| {
-            let noise = if h.base.whitener.coefficients() > 0 { &h.base.whitener } else { &start.base.whitener };
+            let noise = if h.base.whitener.is_white() { &start.base.whitener } else { &h.base.whitener };
             spared(self.setting.data, noise, &start.base.whitener)
         };
         let evidence = |h: &Hypothesis<'_>| {
@@ -73,8 +73,7 @@ impl<'d> Search<'_, 'd> {
             h.log_evidence + spared_by(h) - if slow { SLOW } else { 0.0 }
         };
         let none = start.log_evidence + spared_by(start);
-        let whitens =
-            |h: &Hypothesis<'_>| start.base.whitener.coefficients() > 0 && h.base.whitener.coefficients() == 0;
+        let whitens = |h: &Hypothesis<'_>| !start.base.whitener.is_white() && h.base.whitener.is_white();
         let odds = |h: &Hypothesis<'_>| if whitens(h) { 1.0 } else { ODDS_AGAINST };
         let bound = |h: &Hypothesis<'_>| odds(h) * sets(h) * (none - evidence(h)).exp();
         let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;

@@ -165,7 +165,7 @@ impl<'a> SelfRecord<'a> {
             (0..target.len()).map(|o| Series { stretch: 0, output: o, first: 0, rows: o * SAMPLES..(o + 1) * SAMPLES });
         let layout = Layout { series: series.collect(), outputs: target.len() };
         let sizes = target.iter().map(|y| rms(y.iter().copied()).max(f64::MIN_POSITIVE));
-        let whitener = Whitener { models: sizes.map(NoiseModel::white).collect() };
+        let whitener = Whitener::of(sizes.map(NoiseModel::white).collect());
         Self { compiled, drive, target, fitted, bounds, layout, whitener }
     }
 
