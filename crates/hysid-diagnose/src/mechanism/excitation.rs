@@ -10,8 +10,12 @@ use crate::evidence::quantile;
 pub enum Need {
     /// The velocity changes its sign at least so often.
     Reversals(&'static str, usize),
+    /// The speed, whatever its sign, turns at least so often: a law over the speed shows in one direction too.
+    Sweeps(&'static str, usize),
     /// Large and small swings differ by this factor.
     Levels(&'static str, f64),
+    /// The speed varies: at one speed a place and a moment come back together.
+    Varies(&'static str),
     /// There are phases of slow motion.
     Slow(&'static str),
     /// The signal goes to both sides of its mean by comparable amounts.
@@ -33,6 +37,9 @@ pub enum Need {
     /// The simulated output changes its sign and the recorded one does not.
     Simulated(&'static str),
 }
+
+/// Share of its rms by which a speed must vary.
+const VARIED: f64 = 0.1;
 
 fn turns(signals: &Signals, series: &[f64]) -> Vec<f64> {
     let threshold = 0.05 * rms(series, mean(series));
@@ -61,6 +68,11 @@ impl Need {
                 let found = v.windows(2).filter(|w| matches!(w, [a, b] if a * b < 0.0)).count();
                 (found < least).then(|| format!("the velocity reverses {found} times, {least} are needed"))
             }
+            Self::Sweeps(v, least) => {
+                let speed: Vec<f64> = series(v)?.iter().map(|v| v.abs()).collect();
+                let found = turns(signals, &speed).len();
+                (found < least).then(|| format!("the speed turns {found} times, {least} are needed"))
+            }
             Self::Levels(symbol, factor) => {
                 let s = series(symbol)?;
                 let middle = mean(s);
@@ -73,6 +85,13 @@ impl Need {
                         word(symbol),
                         high / low
                     )
+                })
+            }
+            Self::Varies(v) => {
+                let speed: Vec<f64> = series(v)?.iter().map(|v| v.abs()).collect();
+                let share = rms(&speed, mean(&speed)) / rms(&speed, 0.0).max(f64::MIN_POSITIVE);
+                (share < VARIED).then(|| {
+                    format!("the speed varies by {:.1} % only, {} % are needed", 100.0 * share, 100.0 * VARIED)
                 })
             }
             Self::Slow(v) => {
@@ -155,7 +174,9 @@ impl Need {
     pub fn describe(&self) -> String {
         match *self {
             Self::Reversals(_, least) => format!("at least {least} reversals of the velocity"),
+            Self::Sweeps(_, least) => format!("at least {least} turns of the speed"),
             Self::Levels(symbol, factor) => format!("swings of {} that differ by a factor of {factor}", word(symbol)),
+            Self::Varies(_) => format!("a speed that varies by {} %", 100.0 * VARIED),
             Self::Slow(_) => "2 % of the time at slow motion".to_owned(),
             Self::BothSides(symbol) => format!("{} on both sides", word(symbol)),
             Self::EarlyAndLate(_) => "activity early and late".to_owned(),
@@ -177,5 +198,31 @@ fn word(symbol: &str) -> &'static str {
         "u" => "the input",
         "s" => "the level",
         _ => "the output",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    #[test]
+    fn a_speed_that_rises_and_falls_needs_no_reversal() {
+        let v: Vec<f64> = (0..1000).map(|n| 1.0 + 0.95 * (0.05 * f64::from(n)).sin()).collect();
+        let signals = |v: Vec<f64>| Signals::new(0.01, 0.0, BTreeMap::from([("v".to_owned(), v)]));
+        let there = signals(v.clone());
+        assert_eq!(Need::Sweeps("v", 6).lacking(&there), None);
+        let lacking = Need::Reversals("v", 6).lacking(&there).unwrap();
+        assert!(lacking.contains("0 times"), "{lacking}");
+        let once = signals(v[..200].to_vec());
+        assert!(Need::Sweeps("v", 6).lacking(&once).is_some());
+        assert_eq!(Need::Varies("v").lacking(&there), None);
+        let steady = signals(v.iter().map(|v| 20.0 + v).collect());
+        assert!(
+            Need::Varies("v").lacking(&steady).unwrap().contains("3.2 %"),
+            "{:?}",
+            Need::Varies("v").lacking(&steady)
+        );
     }
 }

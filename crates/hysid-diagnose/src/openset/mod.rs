@@ -284,13 +284,18 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_elsewhere_is_seen_through_its_products() {
+    fn what_moves_elsewhere_is_seen() {
         // The centrifugal force of the swing; nothing moves the rope in the simulation as it is, and its own parameter has no influence.
         let found = missing(" + 3.0*w^2").unwrap();
         let first = &found.record.terms[0];
         assert_eq!((found.record.slot.as_str(), first.term.as_str()), ("state:sd", "w^2"), "{:?}", found.record.terms);
         assert!((first.coefficient / 3.0 - 1.0).abs() < 0.05 && found.gain > 50.0, "{first:?} {}", found.gain);
         assert_eq!(found.record.signature.side, "plant");
+        // The sway of the rope with the swing, in proportion: no parameter of the simulation does that.
+        let found = missing(" + 0.4*w").unwrap();
+        let first = &found.record.terms[0];
+        assert_eq!((found.record.slot.as_str(), first.term.as_str()), ("state:sd", "w"), "{:?}", found.record.terms);
+        assert!((first.coefficient / 0.4 - 1.0).abs() < 0.05 && found.gain > 50.0, "{first:?} {}", found.gain);
         let nothing = missing("");
         assert!(nothing.is_none_or(|o| o.by_chance(ODDS_AGAINST) > 0.1));
     }

@@ -211,6 +211,11 @@ pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -
     ]
 }
 
+/// A signal as it is.
+pub fn proportional((a, x): (&str, &[Vec<f64>])) -> Shape {
+    Shape::new(a.to_owned(), Kind::Odd, x.to_vec())
+}
+
 /// Two signals multiplied, which may be the same.
 pub fn product((a, x): (&str, &[Vec<f64>]), (b, y): (&str, &[Vec<f64>])) -> Shape {
     let text = if a == b { format!("{a}^2") } else { format!("{a}*{b}") };

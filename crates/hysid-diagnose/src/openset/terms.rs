@@ -135,6 +135,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (coordinates[i].0.as_str(), series[i].as_slice());
         for other in own..coordinates.len() {
+            found.push(shapes::proportional(named(other)));
             found.extend((0..=other).map(|i| shapes::product(named(i), named(other))));
             found.extend(inputs.iter().map(|(u, input)| shapes::product((u, input), named(other))));
         }
@@ -188,11 +189,11 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         .collect()
 }
 
-/// Most states of other parts in whose products a slot's correction may be written.
+/// Most states of other parts in which a slot's correction may be written.
 const OTHERS: usize = 6;
 
 /// The states that none of a slot's own coordinates is made of: what moves elsewhere acts through products (a swing's centrifugal force, a field's
-/// pull); in proportion it is a matter of the simulation's own parameters.
+/// pull), and in proportion where the simulation has no parameter for it (two axes that a spinning wheel couples).
 fn others<'s>(simulation: &'s Simulation, own: &[(String, Expr, bool)]) -> Vec<&'s str> {
     let known: Vec<String> = own.iter().flat_map(|(_, meaning, _)| meaning.symbols()).collect();
     let states = simulation.states.iter().map(|s| s.name.as_str());

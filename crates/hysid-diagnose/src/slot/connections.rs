@@ -9,10 +9,15 @@ use super::{Place, Pull, Slot, Target};
 
 /// Whether a product is told with a minus.
 fn is_negative(product: &Expr) -> bool {
-    match quotient(product.clone(), Expr::Number(1.0)) {
-        Expr::Neg(_) => true,
-        Expr::Number(n) => n < 0.0,
-        _ => false,
+    signed(product.clone()).0
+}
+
+/// Whether a product is told with a minus, and the product without it.
+fn signed(product: Expr) -> (bool, Expr) {
+    match quotient(product, Expr::Number(1.0)) {
+        Expr::Neg(size) => (true, *size),
+        Expr::Number(n) if n < 0.0 => (true, Expr::Number(-n)),
+        size => (false, size),
     }
 }
 
@@ -42,9 +47,14 @@ struct Stretch<'a> {
 impl Finder<'_> {
     pub(super) fn connections(&self) -> Vec<Slot> {
         let mut slots = Vec::new();
+        let elements = self.elements();
         for (i, one) in self.motions.iter().enumerate() {
             for other in &self.motions[i + 1..] {
                 let (Some(x1), Some(x2)) = (one.x, other.x) else { continue };
+                // A deflection is no place, and nothing lies between it and one.
+                if elements.iter().any(|e| e.pulls_at(one.state) && e.pulls_at(other.state)) {
+                    continue;
+                }
                 let units = (self.simulation.unit_of(x1), self.simulation.unit_of(x2));
                 let alike = match &units {
                     (Some(a), Some(b)) => a.same_dimension(b),
@@ -68,7 +78,7 @@ impl Finder<'_> {
         }
         slots.extend(self.twists());
         slots.extend(self.bases());
-        slots.extend(self.elements());
+        slots.extend(elements);
         slots
     }
 
@@ -77,42 +87,60 @@ impl Finder<'_> {
     fn elements(&self) -> Vec<Slot> {
         let element = |one: &Motion<'_>| {
             let x = one.x?;
-            let spring = |m: &Motion<'_>| {
-                let mut alone = forces_of(self.simulation, m).filter(|(_, t)| t.uses(x));
-                let (sign, term) = alone.next()?;
-                let own = linear_coefficient(self.simulation, term, x)?;
-                alone.next().is_none().then(|| if sign < 0.0 { -own } else { own })
-            };
-            let rate = spring(one)?;
-            let mut pulls = vec![Pull::new(one.state, 1.0)];
+            // The rate of the deflection may tell the force of its element once for each of the masses at its ends.
+            let own = self.springs(one, x)?;
+            let mut felt = Vec::new();
             for other in self.motions.iter().filter(|m| m.v != one.v) {
                 let mut terms = forces_of(self.simulation, other).filter(|(_, t)| t.uses(x));
                 if terms.any(|(_, t)| t.uses(other.v) || other.x.is_some_and(|x2| t.uses(x2))) {
                     return None;
                 }
-                let Some(there) = spring(other) else { continue };
-                let ratio = quotient(-there, rate.clone());
-                let (sign, ratio) =
-                    if is_negative(&ratio) { (1.0, quotient(-ratio, Expr::Number(1.0))) } else { (-1.0, ratio) };
-                if rate.symbols().iter().any(|s| ratio.uses(s)) {
-                    return None;
-                }
-                pulls.push(Pull { lever: unless_one(ratio), ..Pull::new(other.state, sign) });
+                let Some(springs) = self.springs(other, x) else { continue };
+                let [there] = <[Expr; 1]>::try_from(springs).ok()?;
+                felt.push((other, there));
             }
-            let [_, other, ..] = &pulls[..] else { return None };
-            let other = self.motions.iter().find(|m| m.state == other.state)?;
+            let (other, first) = felt.first()?;
+            // The force is that of the deflection's own equation, or the one that the first of the others feels where its own holds several shares of it.
+            let unit = if let [own] = &own[..] { own.clone() } else { -first.clone() };
+            let share = |springs: &[Expr]| {
+                let (negative, shares): (Vec<bool>, Vec<Expr>) =
+                    springs.iter().map(|s| quotient(s.clone(), unit.clone())).map(signed).unzip();
+                let one_way = negative.iter().all(|n| *n == negative[0]);
+                let whole = shares.into_iter().reduce(|a, b| a + b)?;
+                let cancelled = !unit.symbols().iter().any(|s| whole.uses(s));
+                (one_way && cancelled).then(|| (if negative[0] { -1.0 } else { 1.0 }, unless_one(whole)))
+            };
+            let (_, lever) = share(&own).filter(|(sign, _)| *sign > 0.0)?;
+            let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.state, 1.0) }];
+            for (other, there) in &felt {
+                let (sign, lever) = share(std::slice::from_ref(there))?;
+                pulls.push(Pull { lever, ..Pull::new(other.state, sign) });
+            }
             let stretch = Stretch {
                 x: Expr::symbol(x),
                 v: one.rate(),
                 symbol: x,
                 sign: -1.0,
-                lever: None,
+                lever,
                 other: Some(other),
                 words: format!("in {x}, which pulls at {} coordinates", pulls.len()),
             };
             Some(Slot { target: Target::Derivatives(pulls), ..self.connection(one, stretch) })
         };
         self.motions.iter().filter_map(element).collect()
+    }
+
+    /// What a deflection pulls with for each unit of it, in each term of the force on a part that holds it; `None` where there is none or one is not
+    /// linear.
+    fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
+        let terms = forces_of(self.simulation, part).filter(|(_, t)| t.uses(x));
+        let all: Vec<Expr> = terms
+            .map(|(sign, term)| {
+                let rate = linear_coefficient(self.simulation, term, x)?;
+                Some(if sign < 0.0 { -rate } else { rate })
+            })
+            .collect::<Option<_>>()?;
+        (!all.is_empty()).then_some(all)
     }
 
     /// Connections with a motion that an input prescribes, as the ground under a structure: a force that holds a velocity and the rate of the input
@@ -288,8 +316,17 @@ pub(super) mod tests {
             ("w2", "u - c*w2", "rad/s"),
         ];
         let found = slots(Place::Connection, &drifts);
-        assert!(found.contains(&["d1", "v1", "k", "-v1 +v2"].map(str::to_owned)), "{found:?}");
-        assert!(found.contains(&["d2", "v2", "2*k", "-v2 +1/2*v1"].map(str::to_owned)), "{found:?}");
+        let expected = [["d1", "v1", "k", "-v1 +v2"], ["d2", "v2", "2*k", "-v2 +1/2*v1"]];
+        assert_eq!(found, expected.map(|slot| slot.map(str::to_owned)));
+        // A deflection whose rate tells the force of its element for both of its ends, each with its mass.
+        let relative = [
+            ("q1", "w1", "m"),
+            ("w1", "(u - n*q1 + k*d + c*w2)/J", "m/s"),
+            ("d", "w2", "m"),
+            ("w2", "-(k*d + c*w2)/n - (u - n*q1 + k*d + c*w2)/J", "m/s"),
+        ];
+        let found = slots(Place::Connection, &relative);
+        assert_eq!(found, [["d", "w2", "-((-k/n - k/J)/(1/n + 1/J))", "-(1/n + 1/J)*w2 +w1"].map(str::to_owned)]);
         // A controller's reference is no ground.
         assert!(slots(Place::Connection, &[based[0], ("w2", "(k*(u - q2) - c*w2)/J", rate)]).is_empty());
         assert!(slots(Place::Connection, &twisted("w1 + w2", "(u - k*z)/J", "-k*z/J")).is_empty());

@@ -162,6 +162,11 @@ impl Display for Slot {
 }
 
 impl Slot {
+    /// Whether a force here changes the derivative of this state.
+    fn pulls_at(&self, state: &str) -> bool {
+        matches!(&self.target, Target::Derivatives(pulls) if pulls.iter().any(|p| p.state == state))
+    }
+
     fn new(place: Place, label: String, whereabouts: String, target: Target) -> Self {
         Self {
             place,

@@ -26,7 +26,7 @@ pub static COGGING: Mechanism = Mechanism {
     },
     contains: &["gravity"],
     confusable: &["stribeck_friction", "cubic_stiffness"],
-    needs: &[Need::Slow("v")],
+    needs: &[Need::Varies("v")],
     sentence: "A force of {A} repeats every {p_x} of travel {place}; the simulation has none.",
     signature: "Lines whose frequency follows the speed; periodic in the position.",
     reference: "T. M. Jahns, W. L. Soong, Pulsating torque minimization techniques for permanent magnet AC motor drives, IEEE Trans. Ind. Electron. 43 (1996) 321-330",
