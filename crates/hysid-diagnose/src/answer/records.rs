@@ -90,7 +90,7 @@ pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<Alterna
 pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Candidate]) -> Option<LocationRecord> {
     let effect = best.effects.first();
     let candidate = match effect {
-        Some(e) => candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.label == e.slot.label)?,
+        Some(e) => candidates.iter().find(|c| c.mechanism.id == e.mechanism.id && c.slot.is_at(&e.slot))?,
         None => candidates.first()?,
     };
     let data = none.base.model.data();

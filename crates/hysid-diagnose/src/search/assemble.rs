@@ -7,13 +7,14 @@ use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Purpose};
 use crate::model::Values;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
+use crate::slot::Slot;
 
-/// An effect to be written: the mechanism, the slot's name, values of its parameters in the order of the law.
+/// An effect to be written: the mechanism, the slot, values of its parameters in the order of the law.
 pub struct Part {
     /// The mechanism.
     pub mechanism: &'static Mechanism,
     /// The slot.
-    pub slot: String,
+    pub slot: Slot,
     /// The form of its law.
     pub purpose: Purpose,
     /// Start values of amplitudes, then shapes; missing ones stay as the law has them.
@@ -34,7 +35,7 @@ impl Part {
         let values = candidate.refit.parameters_of();
         Self {
             mechanism: candidate.mechanism,
-            slot: candidate.slot.label.clone(),
+            slot: candidate.slot.clone(),
             purpose: candidate.refit.purpose,
             values: values
                 .iter()
@@ -48,7 +49,7 @@ impl Part {
     pub fn of_effect(effect: &Effect, values: &Values) -> Self {
         Self {
             mechanism: effect.mechanism,
-            slot: effect.slot.label.clone(),
+            slot: effect.slot.clone(),
             purpose: effect.written.purpose,
             values: effect.written.parameters_of().iter().map(|n| values.parameters.get(n).copied()).collect(),
             concealment: effect.concealment,
@@ -112,4 +113,50 @@ pub fn without<'d>(
         return None;
     }
     assemble(setting, none, &values, &rest, &none.base.whitener, setting.iterations).map(|h| complete(setting, h))
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::{Compiled, Drive, Run, Simulation};
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{drive, normal};
+    use crate::search::screen::screen;
+    use crate::slot::Place;
+
+    const PERIOD: f64 = 0.02;
+
+    /// A spring to the ground and one between two masses have one label: each is written where it was found.
+    #[test]
+    fn an_effect_is_written_anew_where_it_stands() {
+        let text = include_str!("../mechanism/specimens/two_masses.sim.toml");
+        let original = Simulation::parse(text, "two_masses.sim.toml").unwrap();
+        let mut random = normal(8);
+        let u = drive(600, &mut random);
+        let compiled = Compiled::new(&original).unwrap();
+        let run = Drive::new(0.0, PERIOD, u.len(), vec![u.clone()]).unwrap();
+        let outputs = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs;
+        let mut columns = vec![(original.inputs[0].column.as_str(), u)];
+        for (output, y) in original.outputs.iter().zip(outputs) {
+            let size = crate::oscillator::rms(&y);
+            columns.push((output.column.as_str(), y.into_iter().map(|y| y + 0.01 * size * random()).collect()));
+        }
+        let columns: [_; 3] = columns.try_into().unwrap();
+        let data = recorded(&original, PERIOD, columns);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original.clone(), &data, NoiseKind::White(1.0), &budget);
+        let found =
+            screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| m.id == "cubic_stiffness");
+        let places: Vec<Place> = found.iter().map(|c| c.slot.place).collect();
+        assert!(places.contains(&Place::Force) && places.contains(&Place::Connection), "{places:?}");
+        for c in &found {
+            let part = Part::of_candidate(c, 0, &[]);
+            let set = assemble(&setting, &none, &none.base.values(), &[part], &none.base.whitener, 1).unwrap();
+            assert!(set.effects[0].slot.is_at(&c.slot), "{} {}", c.slot.label, c.slot.whereabouts);
+            assert_eq!(set.effects[0].written.simulation, c.refit.simulation);
+        }
+    }
 }

@@ -92,8 +92,7 @@ fn written_as<'d>(
     let values = h.base.values();
     let effect = &h.effects[index];
     let (slot, mechanism) = (&effect.slot, effect.mechanism);
-    let (written, _) =
-        rewrite_at(&trunk.base, &trunk.base.document(), &setting.original, mechanism, &slot.label, purpose)?;
+    let (written, _) = rewrite_at(&trunk.base, &trunk.base.document(), &setting.original, mechanism, slot, purpose)?;
     let old = named(present, effect, &values);
     let names = Names::of(law);
     // What the present form says too is kept; the rest starts at the points of its grid.

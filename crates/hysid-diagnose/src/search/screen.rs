@@ -261,20 +261,24 @@ pub fn with_added_starts(values: &Values, effect: &Rewritten, slot: &Slot, stret
     out
 }
 
-/// A mechanism written into a document at the slot of that label, scaled by the signals of a calibrated simulation.
+/// A mechanism written into a document at this slot, scaled by the signals of a calibrated simulation.
 pub fn rewrite_at(
     base: &Base<'_>,
     document: &Simulation,
     original: &Simulation,
     mechanism: &'static Mechanism,
-    label: &str,
+    slot: &Slot,
     purpose: Purpose,
 ) -> Option<(Rewritten, Slot)> {
     let sizes = Structure::within(&base.document(), original);
     let at = signals(base, &sizes, &residual_peaks(base), &[]);
-    let place = sizes.slots.iter().position(|s| s.label == label && mechanism.places.contains(&s.place))?;
+    // What the simulation's numerics lack is told in words of its own.
+    let known = |s: &&Slot| s.label == slot.label && mechanism.places.contains(&s.place);
+    let place_in =
+        |slots: &[Slot]| slots.iter().position(|s| s.is_at(slot)).or_else(|| slots.iter().position(|s| known(&s)));
+    let place = place_in(&sizes.slots)?;
     let structure = Structure::within(document, original);
-    let slot = structure.slots.iter().find(|s| s.label == label && mechanism.places.contains(&s.place))?.clone();
+    let slot = structure.slots[place_in(&structure.slots)?].clone();
     let written = mechanism.rewrite(document, &slot, at[place].as_ref()?, purpose).ok()?;
     Some((written, slot))
 }

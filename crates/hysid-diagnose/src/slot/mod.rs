@@ -162,6 +162,11 @@ impl Display for Slot {
 }
 
 impl Slot {
+    /// Whether it is the same place: a force on a part and one between it and another share a label.
+    pub fn is_at(&self, other: &Self) -> bool {
+        (self.place, &self.label, &self.whereabouts) == (other.place, &other.label, &other.whereabouts)
+    }
+
     /// Whether a force here changes the derivative of this state.
     fn pulls_at(&self, state: &str) -> bool {
         matches!(&self.target, Target::Derivatives(pulls) if pulls.iter().any(|p| p.state == state))

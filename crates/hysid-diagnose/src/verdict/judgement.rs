@@ -207,7 +207,7 @@ fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String
         if let Some(confused) = confused {
             return Some(format!("{id}: this is not firm, since {confused}"));
         }
-        let candidate = candidates.iter().find(|c| c.mechanism.id == id && c.slot.label == e.slot.label)?;
+        let candidate = candidates.iter().find(|c| c.mechanism.id == id && c.slot.is_at(&e.slot))?;
         let lacking = candidate.lacking.as_ref()?;
         Some(format!("{id}: for a firm answer the recording lacks something: {lacking}"))
     };

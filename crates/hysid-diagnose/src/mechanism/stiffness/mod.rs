@@ -2,6 +2,7 @@
 
 mod bilinear;
 mod cogging;
+mod contact;
 mod cubic;
 mod gap_stop;
 mod gravity;
