@@ -5,7 +5,7 @@
 //! truth, writing the likeliest set brings its distance from the truth, and writing nothing brings the baseline's. It is written where its
 //! expected loss is well below that of writing nothing. Inputs are the recorded ones mirrored (each about the middle of its range) and reversed in
 //! time, which have the same levels and the same band, and lead elsewhere; and twice as large, where a spring that softens by a power of the displacement
-//! pushes. They begin as they were recorded and fade over, so that nothing hangs on how states begin.
+//! pushes. The set itself is among the truths with those of its strengths that the recording hardly tells at the ends of their intervals. They begin as they were recorded and fade over, so that nothing hangs on how states begin.
 //!
 //! Reference: J. O. Berger, Statistical Decision Theory and Bayesian Analysis, 2nd ed., Springer (1985), ch. 4.
 
@@ -13,8 +13,9 @@ use hysid_plant::{Drive, Initial, Simulation};
 
 use crate::data::DataSet;
 use crate::model::base::Base;
-use crate::model::hypothesis::Setting;
+use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::model::{Model, Values};
+use crate::refit::Problem;
 use crate::verdict::weigh::Contest;
 
 /// Share that a set may have on average of what it and nothing would lose. Below a half: the truth may be none of the sets that were fitted.
@@ -25,11 +26,46 @@ const RUN_IN: usize = 5;
 const RIVALS: usize = 8;
 const LIKELY: f64 = 0.005;
 
+/// Share of itself within which a strength must be known (standard deviation) not to be asked.
+const KNOWN: f64 = 0.25;
+/// Standard deviations to which one that is known worse is taken, and the share of the set's probability that all of these have together.
+const AWAY: f64 = 1.96;
+const SHARE: f64 = 0.5;
+
 /// The fitted simulation as it starts anew: where the document says, free states at zero.
 pub fn started(base: &Base<'_>) -> Simulation {
-    let mut document = base.document();
+    started_at(base, &base.fit.theta)
+}
+
+/// The same with other values of its unknowns.
+fn started_at(base: &Base<'_>, theta: &[f64]) -> Simulation {
+    let mut document = base.model.document(theta);
     document.states.iter_mut().filter(|s| s.initial == Initial::Free).for_each(|s| s.initial = Initial::Number(0.0));
     document
+}
+
+/// A set with each of its effects' strengths that the recording hardly tells at the ends of what it may be, the other unknowns as they follow it: a stop that
+/// was touched once is deep where an input goes on.
+fn uncertain(h: &Hypothesis<'_>) -> Vec<Simulation> {
+    let base = &h.base;
+    let (theta, k, covariance, bounds) =
+        (&base.fit.theta, base.fit.theta.len(), base.covariance(), base.model.bounds());
+    let strengths = h.effects.iter().flat_map(|e| &e.written.amplitudes);
+    let places = strengths.filter_map(|a| base.model.place_of(&a.name));
+    let unknown = places.filter(|&i| covariance[i * (k + 1)].sqrt() > KNOWN * theta[i].abs());
+    unknown
+        .flat_map(|i| {
+            let variance = covariance[i * (k + 1)];
+            [-AWAY, AWAY].map(|times| {
+                let end = (theta[i] + times * variance.sqrt()).clamp(bounds[i].0, bounds[i].1);
+                let moved = |j: usize| {
+                    let x = theta[j] + covariance[i * k + j] / variance * (end - theta[i]);
+                    if x.is_finite() { x.clamp(bounds[j].0, bounds[j].1) } else { theta[j] }
+                };
+                started_at(base, &(0..k).map(moved).collect::<Vec<_>>())
+            })
+        })
+        .collect()
 }
 
 /// An input as a data set, with what a simulation answers to it as its outputs; `None` where it diverges.
@@ -90,8 +126,14 @@ pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
     let mut rivals: Vec<usize> =
         (1..pool.len()).filter(|&i| i != winner && probability[i] > LIKELY && !pool[i].effects.is_empty()).collect();
     rivals.sort_by(|&a, &b| probability[b].total_cmp(&probability[a]));
-    let rivals: Vec<(f64, Simulation)> =
+    let mut rivals: Vec<(f64, Simulation)> =
         rivals.into_iter().take(RIVALS).map(|i| (probability[i], started(&pool[i].base))).collect();
+    let itself = uncertain(&pool[winner]);
+    let (each, own) = match itself.len() {
+        0 => (0.0, probability[winner]),
+        n => (SHARE * probability[winner] / n as f64, (1.0 - SHARE) * probability[winner]),
+    };
+    rivals.extend(itself.into_iter().map(|s| (each, s)));
     if rivals.is_empty() {
         return None;
     }
@@ -103,7 +145,7 @@ pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
         .filter_map(|change| {
             let inputs = recorded.inputs().iter().map(|u| faded(u, &change(u))).collect();
             let drive = Drive::new(recorded.start_s(), recorded.period_s(), recorded.len(), inputs).ok()?;
-            expected_share(&nothing, (probability[winner], &best), &rivals, &drive, setting.substeps, &noise)
+            expected_share(&nothing, (own, &best), &rivals, &drive, setting.substeps, &noise)
         })
         .max_by(f64::total_cmp)
         .filter(|loss| *loss > WORTH)
@@ -150,6 +192,38 @@ mod tests {
              [outputs]\nq_m = \"q\"\n"
         );
         Simulation::parse(&text, "drive").unwrap()
+    }
+
+    /// What `uncertain` says of a cubic spring that is fitted where there is this one, as the values of its strength.
+    fn strengths_of(cube: f64) -> (f64, Vec<f64>) {
+        use crate::model::base::NoiseKind;
+        use crate::model::hypothesis::{calibrated, recorded};
+        use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+        use crate::search::fitting::refit;
+        use crate::search::screen::screen;
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut random = normal(6);
+        let u = drive(900, &mut random);
+        let mut y = respond(&u, REAL, |x, _| cube * x.powi(3));
+        let noise = 0.01 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * random());
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        let budget = crate::budget::Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let evidence = none.base.evidence();
+        let found = screen(&none.base, &setting.original, &[], &evidence, &|m, _| m.id == "cubic_stiffness");
+        let h = refit(&setting, &none, &found[0]).unwrap();
+        let name = &h.effects[0].written.amplitudes[0].name;
+        let values = uncertain(&h).iter().map(|s| s.parameter(name).unwrap().value).collect();
+        (h.base.values().parameters[name], values)
+    }
+
+    #[test]
+    fn a_strength_that_is_hardly_known_is_taken_to_its_ends() {
+        assert!(strengths_of(2e5).1.is_empty());
+        let (fitted, ends) = strengths_of(0.0);
+        let [low, high] = ends[..] else { panic!("{ends:?}") };
+        assert!(low < fitted && fitted < high && (high + low - 2.0 * fitted).abs() < 1e-6 * (high - low), "{ends:?}");
     }
 
     fn pushed() -> Drive {

@@ -12,6 +12,8 @@ use super::Grid;
 use super::resolution::resolution;
 use crate::evidence::quantile;
 
+/// Share of the duration within which from either end no moment of a change is looked for.
+const AT_AN_END: f64 = 0.005;
 /// Share of a period over which the way on a straight line is taken: less than a step of the integration.
 const PIECE: f64 = 0.03;
 
@@ -196,7 +198,12 @@ impl Signals {
         };
         let span = (high - low).max(0.5 * high.abs()).max(f64::MIN_POSITIVE);
         match grid {
-            Grid::Times(_) => (self.start_s, self.start_s + self.duration_s()),
+            // Nearer to an end a change is a few samples, or the start that the simulation has.
+            Grid::Times(_) => {
+                let end = self.start_s + self.duration_s();
+                let apart = AT_AN_END * self.duration_s();
+                (self.start_s + apart, end - apart)
+            }
             Grid::Band(_) | Grid::Peaks(_) => (low / 3.0, (high * 3.0).min(0.49 / self.period_s).max(high)),
             Grid::SignedQuantiles(..) => (low - span, high + span),
             _ if low > 0.0 => (low / 5.0, high * 5.0),

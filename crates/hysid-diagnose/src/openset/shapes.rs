@@ -44,6 +44,8 @@ impl Shape {
 
 /// Shares of the samples that lie within a knee, and within the half width of a play or relay over [`WIDTH`].
 const KNEES: [f64; 2] = [0.5, 0.8];
+/// The same within a limit.
+const LIMITS: [f64; 4] = [0.5, 0.75, 0.9, 0.97];
 const WIDTHS: [f64; 3] = [0.2, 0.5, 0.8];
 const WIDTH: f64 = 0.7;
 
@@ -209,6 +211,17 @@ pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -
         product((u, input), (name, x)),
         Shape::new(format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)),
     ]
+}
+
+/// What is beyond limits on either side, at a few places.
+pub fn limits((a, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
+    let places = quantiles(x, LIMITS).into_iter().filter(|r| *r > 0.0);
+    let one = |r: f64| {
+        let n = free(r);
+        let text = format!("max({a} - {n}, 0) - max(-{n} - {a}, 0)");
+        Shape::new(text, Kind::Odd, each(x, |v| (v - r).max(0.0) - (-r - v).max(0.0)))
+    };
+    places.map(one).collect()
 }
 
 /// A signal as it is.

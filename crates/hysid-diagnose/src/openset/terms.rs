@@ -67,7 +67,11 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
     let own: Vec<&str> = structure.slots.iter().map(|s| s.label.as_str()).collect();
     for (i, state) in simulation.states.iter().enumerate() {
         let label = format!("state:{}", state.name);
-        let Some(slot) = structure.slots.iter().find(|s| s.label == label) else { continue };
+        let Some(slot) = structure.slots.iter().find(|s| s.label == label) else {
+            // A part of a cascade, in which only its rate may be limited.
+            places.push((Place::State(i), label, "plant", Vec::new()));
+            continue;
+        };
         let coordinates = ["x", "v"]
             .iter()
             .filter_map(|n| slot.quantity(n).map(|q| ((*n).to_owned(), q.expression.clone(), *n == "v")))
@@ -107,8 +111,15 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
     let mut work: Vec<Signal> = Vec::new();
     for (place, label, side, mut coordinates) in places {
         let own = coordinates.len();
-        if let (Place::State(_), "plant") = (place, side) {
-            let others = others(simulation, &coordinates);
+        if let (Place::State(i), "plant") = (place, side) {
+            // What follows a command by itself, as an actuator does, may do so no faster than it can.
+            let state = &simulation.states[i];
+            let known = others(simulation, &coordinates);
+            let passes = !matches!(state.derivative, Expr::Symbol(_));
+            if passes && coordinates.iter().all(|(name, ..)| *name == state.name) {
+                coordinates.push((format!("rate_{}", state.name), state.derivative.clone(), false));
+            }
+            let others = if own > 0 { known } else { Vec::new() };
             coordinates.extend(others.into_iter().map(|s| (s.to_owned(), Expr::symbol(s), false)));
         }
         let mut expressions: Vec<Expr> = coordinates.iter().map(|c| c.1.clone()).collect();
@@ -134,9 +145,15 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             .collect();
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (coordinates[i].0.as_str(), series[i].as_slice());
-        for other in own..coordinates.len() {
+        let rates = coordinates[own..].iter().take_while(|(name, ..)| name.starts_with("rate_")).count();
+        found.extend((own..own + rates).flat_map(|i| shapes::limits(named(i))));
+        for other in own + rates..coordinates.len() {
             found.push(shapes::proportional(named(other)));
-            found.extend((0..=other).map(|i| shapes::product(named(i), named(other))));
+            found.extend(
+                (0..=other)
+                    .filter(|i| !(own..own + rates).contains(i))
+                    .map(|i| shapes::product(named(i), named(other))),
+            );
             found.extend(inputs.iter().map(|(u, input)| shapes::product((u, input), named(other))));
         }
         for ((name, _, velocity), x) in coordinates[..own].iter().zip(&series) {

@@ -1,6 +1,6 @@
 //! Whether an equation contains an expression of a given form.
 
-use hysid_plant::{BinaryOp, Expr};
+use hysid_plant::{BinaryOp, Expr, Function};
 
 /// No symbol of a simulation begins like this.
 const WILD: char = '?';
@@ -99,17 +99,20 @@ pub(super) fn size_of<'e>(form: &Expr, expr: &'e Expr) -> Option<&'e str> {
     found
 }
 
-/// The smooth step in this symbol, `1/(1 + exp(Z))`, that `expr` holds first, also where something else stands above its line; it holds no memory.
+/// The smooth step in this symbol that `expr` holds first: `1/(1 + exp(Z))`, also where something else stands above its line, `tanh(Z)` or `atan(Z)`; it
+/// holds no memory.
 pub(super) fn step_in(expr: &Expr, symbol: &str) -> Option<Expr> {
     let form = prepare("1 + exp(Z)", |_| None)?;
     let mut found = None;
-    expr.visit(&mut |e| match e {
-        Expr::Binary(BinaryOp::Div, _, below)
-            if found.is_none() && below.uses(symbol) && matches(&form, below) && !below.has_memory() =>
-        {
-            found = Some(Expr::Number(1.0) / (**below).clone());
+    expr.visit(&mut |e| {
+        let step = match e {
+            Expr::Binary(BinaryOp::Div, _, below) if matches(&form, below) => Expr::Number(1.0) / (**below).clone(),
+            Expr::Call(Function::Tanh | Function::Atan, _) => e.clone(),
+            _ => return,
+        };
+        if found.is_none() && step.uses(symbol) && !step.has_memory() {
+            found = Some(step);
         }
-        _ => {}
     });
     found
 }

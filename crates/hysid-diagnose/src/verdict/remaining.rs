@@ -185,7 +185,7 @@ fn in_place<'d>(
 ) -> (Option<(Refitted<'d>, OpenSet)>, Option<Refitted<'d>>) {
     let explained = best.log_evidence - none.log_evidence;
     let likely =
-        |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
+        |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.gains_by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
     let refitted = |o: &OpenSet| {
         let terms = Writable::Sparse(o.sparse()?.within(none.base.document()));
         if search.setting.budget.omits(Step::Imitation) {

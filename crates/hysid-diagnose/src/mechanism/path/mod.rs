@@ -24,7 +24,7 @@ pub(super) fn emptiness(signal: &str, tau: &str) -> String {
 
 /// The recording's duration as a constant of a law, for [`emptiness`].
 pub(super) fn with_duration(law: Law) -> Law {
-    law.constant("T_r", "T", Grid::Values(vec![1.0]))
+    law.constant("T_r", "T", Grid::Values(vec![1.0])).silent()
 }
 
 /// A first-order lag of `signal`, settled at the first sample; in other forms it is empty there, as after switching on, or starts where the

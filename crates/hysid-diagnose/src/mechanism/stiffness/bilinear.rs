@@ -17,7 +17,7 @@ pub static BILINEAR_STIFFNESS: Mechanism = Mechanism {
         contact.law(
             Law::force(format!("k_b*{}", contact.pressed("x - x_0", "v")))
                 .amplitude("k_b", "F/x", -2.0, 50.0)
-                .shape("x_0", "x", Grid::SignedQuantiles("x", vec![0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9]))
+                .shape("x_0", "x", Grid::SignedQuantiles("x", vec![0.02, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 0.98]))
                 .searched(),
         )
     },

@@ -1,6 +1,7 @@
 //! Creep that goes on for decades of time.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, anywhere};
+use crate::mechanism::path::{emptiness, with_duration};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
 /// Creep that goes on for decades of time.
@@ -14,12 +15,22 @@ pub static LOG_CREEP: Mechanism = Mechanism {
     law: |slot, purpose| {
         // The logarithm of time as three relaxations, a decade apart until the recording tells how far.
         let s = if slot.place == Place::Sensor { "y" } else { "u" };
-        let relaxed = format!("lag({s}, tau_1) + lag({s}, rho*tau_1) + lag({s}, rho^2*tau_1)");
-        Law::replace(format!("{s} + gamma*log10(rho)*({relaxed} - 3*{s})"))
+        // An actuator that is switched on has not crept yet.
+        let (fresh, settled) = match purpose {
+            Purpose::Form(Form::Unsettled) => (true, Purpose::Refit),
+            Purpose::Form(Form::FinerUnsettled) => (true, Purpose::Form(Form::Finer)),
+            other => (false, other),
+        };
+        let relaxations = ["tau_1", "(rho*tau_1)", "(rho^2*tau_1)"].map(|tau| match fresh {
+            true => format!("lag({s}, {tau}) - {}", emptiness(s, tau)),
+            false => format!("lag({s}, {tau})"),
+        });
+        let law = Law::replace(format!("{s} + gamma*log10(rho)*({} - 3*{s})", relaxations.join(" + ")))
             .amplitude("gamma", "1", 0.0, 0.3)
             .shape("tau_1", "T", Grid::Values(vec![0.001, 0.003, 0.01]))
             .within(0.0001, 0.1)
-            .detail(purpose, "rho", "1", vec![10.0], (3.0, 30.0))
+            .detail(settled, "rho", "1", vec![10.0], (3.0, 30.0));
+        if fresh { with_duration(law) } else { law }
     },
     contains: &[],
     confusable: &["sensor_drift", "parameter_drift", "viscoelastic"],
