@@ -15,6 +15,7 @@ pub mod needed;
 mod regress;
 mod shapes;
 mod signature;
+mod sites;
 mod terms;
 pub mod uneven;
 pub mod varying;

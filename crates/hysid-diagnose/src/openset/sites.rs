@@ -1,0 +1,112 @@
+//! Where generic terms act, and over what.
+
+use hysid_plant::{Expr, Simulation, Slot as Place};
+
+use crate::slot::Structure;
+
+/// A signal that terms are written over.
+#[derive(Debug, Clone)]
+pub struct Symbol {
+    /// As it is called in a term's text.
+    pub name: String,
+    /// What it stands for.
+    pub meaning: Expr,
+    /// Whether it is a velocity.
+    pub velocity: bool,
+}
+
+impl Symbol {
+    fn new(name: &str, meaning: Expr) -> Self {
+        Self { name: name.to_owned(), meaning, velocity: false }
+    }
+
+    fn itself(name: &str) -> Self {
+        Self::new(name, Expr::symbol(name))
+    }
+}
+
+/// A place at which generic terms act.
+#[derive(Debug)]
+pub struct Site {
+    /// In the engine.
+    pub place: Place,
+    /// The slot's name.
+    pub slot: String,
+    /// Plant, input or output.
+    pub side: &'static str,
+    /// What is there.
+    pub own: Vec<Symbol>,
+    /// The rate of what follows a command by itself, as an actuator does, which may be limited.
+    pub rate: Option<Symbol>,
+    /// What moves elsewhere.
+    pub others: Vec<Symbol>,
+}
+
+impl Site {
+    /// All that terms are written over, in this order.
+    pub fn symbols(&self) -> impl Iterator<Item = &Symbol> {
+        self.own.iter().chain(&self.rate).chain(&self.others)
+    }
+}
+
+/// Most states of other parts in which a slot's correction may be written.
+const OTHERS: usize = 6;
+
+/// The places of a simulation at which generic terms act.
+pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
+    let states = (0..simulation.states.len()).map(|i| of_state(simulation, structure, i));
+    let has_slot = |label: &String| structure.slots.iter().any(|s| s.label == *label);
+    let inputs = simulation.inputs.iter().enumerate().filter(|_| !simulation.is_static()).map(|(i, input)| Site {
+        place: Place::Input(i),
+        slot: format!("input:{}", input.symbol),
+        side: "input",
+        own: vec![Symbol::itself(&input.symbol)],
+        rate: None,
+        others: Vec::new(),
+    });
+    let outputs = simulation.outputs.iter().enumerate().map(|(i, output)| {
+        let signal = |name: &String| Symbol { velocity: name.starts_with('v'), ..Symbol::itself(name) };
+        let (side, own) = if simulation.is_static() {
+            ("plant", simulation.inputs.iter().map(|u| signal(&u.symbol)).collect())
+        } else {
+            ("output", vec![Symbol::new("y", output.expression.clone())])
+        };
+        Site {
+            place: Place::Output(i),
+            slot: format!("output:{}", output.column),
+            side,
+            own,
+            rate: None,
+            others: Vec::new(),
+        }
+    });
+    states.chain(inputs.filter(|site| has_slot(&site.slot))).chain(outputs).collect()
+}
+
+/// The equation of a state. In one that has no slot, as a part of a cascade, only the rate may be limited.
+fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
+    let state = &simulation.states[i];
+    let label = format!("state:{}", state.name);
+    let own = structure.slots.iter().find(|s| s.label == label).map(|slot| {
+        let of = |n: &str| {
+            let meaning = slot.quantity(n)?.expression.clone();
+            let name = if let Expr::Symbol(s) = &meaning { s.clone() } else { n.to_owned() };
+            Some(Symbol { velocity: n == "v", ..Symbol::new(&name, meaning) })
+        };
+        let motion: Vec<Symbol> = ["x", "v"].into_iter().filter_map(of).collect();
+        if motion.is_empty() { vec![Symbol::itself(&state.name)] } else { motion }
+    });
+    let others = own.as_ref().map_or(Vec::new(), |own| others(simulation, own));
+    let own = own.unwrap_or_default();
+    let moves_by_itself = own.iter().all(|s| s.name == state.name) && !matches!(state.derivative, Expr::Symbol(_));
+    let rate = moves_by_itself.then(|| Symbol::new(&format!("rate_{}", state.name), state.derivative.clone()));
+    Site { place: Place::State(i), slot: label, side: "plant", own, rate, others }
+}
+
+/// The states that none of a slot's own coordinates is made of: what moves elsewhere acts through products (a swing's centrifugal force, a field's
+/// pull), and in proportion where the simulation has no parameter for it (two axes that a spinning wheel couples).
+fn others(simulation: &Simulation, own: &[Symbol]) -> Vec<Symbol> {
+    let known: Vec<String> = own.iter().flat_map(|s| s.meaning.symbols()).collect();
+    let states = simulation.states.iter().map(|s| s.name.as_str());
+    states.filter(|name| known.iter().all(|k| k != name)).take(OTHERS).map(Symbol::itself).collect()
+}
