@@ -20,6 +20,7 @@ use crate::model::base::NoiseKind;
 use crate::model::force::pushed;
 use crate::model::hold::free_run;
 use crate::model::hypothesis::{Hypothesis, Setting};
+use crate::openset::shapes::told_limit;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
 use crate::search::profile::{centre_moments, take_intervals};
@@ -128,7 +129,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.notes.extend(absorbing(&pool[0].base, simulation));
     file.notes.extend(lacking.into_iter().flatten());
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
-    let varying = varying.or(wanders);
+    let loudest = file.correction.iter().flat_map(|c| &c.terms).max_by(|a, b| a.err.total_cmp(&b.err));
+    let varying = loudest.and_then(|t| told_limit(&t.term)).or(varying).or(wanders);
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
     if runs_away {
         file.summary = "The simulation runs away by itself: no free run of it can follow the recording, and nothing can be said of what it lacks.".into();

@@ -15,6 +15,7 @@ use crate::model::hold::FreeRun;
 use crate::model::hypothesis::{Effect, Hypothesis};
 use crate::request::{Question, words};
 use crate::search::screen::Candidate;
+use crate::text::number;
 use crate::verdict::Support;
 use crate::verdict::weigh::Contest;
 
@@ -270,8 +271,14 @@ pub fn summary(file: &DiagnosisFile, varying: Option<&str>, unequal: Option<&str
                 )
             }
             None => {
-                "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it."
-                    .into()
+                let terms = file.correction.iter().flat_map(|c| c.terms.iter().map(move |t| (t, c)));
+                let loudest = terms.max_by(|a, b| a.0.err.total_cmp(&b.0.err));
+                let told = loudest.map_or_else(String::new, |(t, c)| {
+                    format!(", first of all {} times `{}` at {}", number(t.coefficient), t.term, c.slot)
+                });
+                format!(
+                    "Something is missing that no mechanism of the catalogue explains; a sparse correction describes it{told}."
+                )
             }
         },
     }

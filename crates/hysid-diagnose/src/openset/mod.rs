@@ -13,7 +13,7 @@ mod course;
 mod modulation;
 pub mod needed;
 mod regress;
-mod shapes;
+pub mod shapes;
 mod signature;
 mod sites;
 mod terms;

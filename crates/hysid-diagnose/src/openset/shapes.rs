@@ -224,6 +224,13 @@ pub fn limits((a, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
     places.map(one).collect()
 }
 
+/// The limit of a rate that a term of [`limits`] tells, in words.
+pub fn told_limit(term: &str) -> Option<String> {
+    let (state, rest) = term.strip_prefix("max(rate_")?.split_once(" - ")?;
+    let (limit, _) = rest.split_once(',')?;
+    Some(format!("the rate of `{state}` is limited, at about {limit} of its unit per second"))
+}
+
 /// A signal as it is.
 pub fn proportional((a, x): (&str, &[Vec<f64>])) -> Shape {
     Shape::new(a.to_owned(), Kind::Odd, x.to_vec())
@@ -303,6 +310,15 @@ pub fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_limit_is_told_as_it_is_written() {
+        let rate = vec![(0..100).map(f64::from).collect::<Vec<_>>()];
+        let texts: Vec<String> = limits(("rate_fin", &rate)).into_iter().map(|s| s.text).collect();
+        assert_eq!(texts[1], "max(rate_fin - 74.2, 0) - max(-74.2 - rate_fin, 0)");
+        assert!(told_limit(&texts[1]).unwrap().contains("`fin` is limited, at about 74.2"));
+        assert_eq!(told_limit("fin^2"), None);
+    }
 
     #[test]
     fn what_depends_on_an_angle_returns_with_every_turn() {
