@@ -1,6 +1,5 @@
 //! A spring whose stiffness changes at one point.
 
-use super::contact::Contact;
 use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
 use crate::slot::Place;
 
@@ -12,14 +11,11 @@ pub static BILINEAR_STIFFNESS: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("x"),
     already: &["max(x, 0)", "max(0, x)", "max(x - P, 0)", "max(0, x - P)", "step(x)*x", "x*step(x)"],
-    law: |slot, purpose| {
-        let contact = Contact::of(slot, purpose);
-        contact.law(
-            Law::force(format!("k_b*{}", contact.pressed("x - x_0", "v")))
-                .amplitude("k_b", "F/x", -2.0, 50.0)
-                .shape("x_0", "x", Grid::SignedQuantiles("x", vec![0.02, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 0.98]))
-                .searched(),
-        )
+    law: |_, _| {
+        Law::force("k_b*max(x - x_0, 0)")
+            .amplitude("k_b", "F/x", -2.0, 50.0)
+            .shape("x_0", "x", Grid::SignedQuantiles("x", vec![0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9]))
+            .searched()
     },
     contains: &[],
     confusable: &["quadratic_stiffness", "gap_stop"],

@@ -1,6 +1,5 @@
 //! Elastic stops beyond a gap on both sides.
 
-use super::contact::Contact;
 use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
 use crate::slot::Place;
 
@@ -12,15 +11,11 @@ pub static GAP_STOP: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("x"),
     already: &["max(x - P, 0)", "max(0, x - P)", "max(abs(x) - P, 0)", "max(0, abs(x) - P)"],
-    law: |slot, purpose| {
-        let contact = Contact::of(slot, purpose);
-        let sides = [contact.pressed("x - g", "v"), contact.pressed("-x - g", "-v")];
-        contact.law(
-            Law::force(format!("k_g*({} - {})", sides[0], sides[1]))
-                .amplitude("k_g", "F/x", -2.0, 50.0)
-                .shape("g", "x", Grid::Quantiles("x", vec![0.3, 0.45, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97, 0.99]))
-                .searched(),
-        )
+    law: |_, _| {
+        Law::force("k_g*(max(x - g, 0) - max(-x - g, 0))")
+            .amplitude("k_g", "F/x", -2.0, 50.0)
+            .shape("g", "x", Grid::Quantiles("x", vec![0.3, 0.45, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97, 0.99]))
+            .searched()
     },
     contains: &[],
     confusable: &["cubic_stiffness", "quintic_stiffness"],

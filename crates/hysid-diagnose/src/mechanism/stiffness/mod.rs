@@ -2,7 +2,6 @@
 
 mod bilinear;
 mod cogging;
-mod contact;
 mod cubic;
 mod gap_stop;
 mod gravity;
