@@ -214,6 +214,13 @@ pub struct CorrectionRecord {
     pub ratio: Option<f64>,
 }
 
+impl CorrectionRecord {
+    /// The term that explains most.
+    pub fn loudest(&self) -> Option<&TermRecord> {
+        self.terms.iter().max_by(|a, b| a.err.total_cmp(&b.err))
+    }
+}
+
 /// One term of a sparse correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TermRecord {

@@ -129,8 +129,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.notes.extend(absorbing(&pool[0].base, simulation));
     file.notes.extend(lacking.into_iter().flatten());
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
-    let loudest = file.correction.iter().flat_map(|c| &c.terms).max_by(|a, b| a.err.total_cmp(&b.err));
-    let varying = loudest.and_then(|t| told_limit(&t.term)).or(varying).or(wanders);
+    let limit = file.correction.as_ref().and_then(|c| told_limit(&c.loudest()?.term));
+    let varying = limit.or(varying).or(wanders);
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
     if runs_away {
         file.summary = "The simulation runs away by itself: no free run of it can follow the recording, and nothing can be said of what it lacks.".into();

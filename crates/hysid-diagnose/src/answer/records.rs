@@ -132,8 +132,7 @@ pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Cand
 pub fn block_of(correction: &CorrectionRecord) -> Block {
     let slot = &correction.slot;
     let own = slot.split_once(':').map_or("", |(_, own)| own);
-    let loudest = correction.terms.iter().max_by(|a, b| a.err.total_cmp(&b.err));
-    let symbols = loudest.and_then(|t| Expr::parse(&t.term).ok()).map(|e| e.symbols()).unwrap_or_default();
+    let symbols = correction.loudest().and_then(|t| Expr::parse(&t.term).ok()).map(|e| e.symbols()).unwrap_or_default();
     if slot.starts_with("parameter:") {
         Block::TimeVariation
     } else if slot.starts_with("input:") {
@@ -271,8 +270,7 @@ pub fn summary(file: &DiagnosisFile, varying: Option<&str>, unequal: Option<&str
                 )
             }
             None => {
-                let terms = file.correction.iter().flat_map(|c| c.terms.iter().map(move |t| (t, c)));
-                let loudest = terms.max_by(|a, b| a.0.err.total_cmp(&b.0.err));
+                let loudest = file.correction.as_ref().and_then(|c| Some((c.loudest()?, c)));
                 let told = loudest.map_or_else(String::new, |(t, c)| {
                     format!(", first of all {} times `{}` at {}", number(t.coefficient), t.term, c.slot)
                 });

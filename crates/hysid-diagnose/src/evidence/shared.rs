@@ -87,9 +87,8 @@ impl Shared {
 
     /// Logarithm of what a row of a series is scaled by.
     pub fn log_scale(&self, layout: &Layout, s: &Series) -> f64 {
-        let all =
-            (0..layout.outputs).all(|o| layout.series.iter().any(|other| other.output == o && other.is_beside(s)));
-        if all { self.factor[(s.output, s.output)].ln() } else { 0.0 }
+        let complete = complete_runs(layout).iter().any(|run| run[s.output] == s);
+        if complete { self.factor[(s.output, s.output)].ln() } else { 0.0 }
     }
 
     fn log_determinant(&self) -> f64 {

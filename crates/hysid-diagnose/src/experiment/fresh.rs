@@ -5,14 +5,15 @@
 //! truth, writing the likeliest set brings its distance from the truth, and writing nothing brings the baseline's. It is written where its
 //! expected loss is well below that of writing nothing. Inputs are the recorded ones mirrored (each about the middle of its range) and reversed in
 //! time, which have the same levels and the same band, and lead elsewhere; and twice as large, where a spring that softens by a power of the displacement
-//! pushes. The set itself is among the truths with those of its strengths that the recording hardly tells at the ends of their intervals. They begin as they were recorded and fade over, so that nothing hangs on how states begin.
+//! pushes. They begin as they were recorded and fade over, so that nothing hangs on how states begin. The set itself is among the truths too, with each
+//! strength that the recording hardly tells at the ends of its interval.
 //!
 //! Reference: J. O. Berger, Statistical Decision Theory and Bayesian Analysis, 2nd ed., Springer (1985), ch. 4.
 
 use hysid_plant::{Drive, Initial, Simulation};
 
 use crate::data::DataSet;
-use crate::model::base::Base;
+use crate::model::base::{Base, QUANTILE};
 use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::model::{Model, Values};
 use crate::refit::Problem;
@@ -28,8 +29,7 @@ const LIKELY: f64 = 0.005;
 
 /// Share of itself within which a strength must be known (standard deviation) not to be asked.
 const KNOWN: f64 = 0.25;
-/// Standard deviations to which one that is known worse is taken, and the share of the set's probability that all of these have together.
-const AWAY: f64 = 1.96;
+/// Share of the set's probability that it has with strengths that are known worse at the ends of their intervals, all of these together.
 const SHARE: f64 = 0.5;
 
 /// The fitted simulation as it starts anew: where the document says, free states at zero.
@@ -56,7 +56,7 @@ fn uncertain(h: &Hypothesis<'_>) -> Vec<Simulation> {
     unknown
         .flat_map(|i| {
             let variance = covariance[i * (k + 1)];
-            [-AWAY, AWAY].map(|times| {
+            [-QUANTILE, QUANTILE].map(|times| {
                 let end = (theta[i] + times * variance.sqrt()).clamp(bounds[i].0, bounds[i].1);
                 let moved = |j: usize| {
                     let x = theta[j] + covariance[i * k + j] / variance * (end - theta[i]);

@@ -13,6 +13,9 @@ use crate::refit::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};
 /// Largest order of the noise models.
 pub const MAX_AR: usize = 16;
 
+/// Standard deviations on either side of a 95 % interval.
+pub const QUANTILE: f64 = 1.96;
+
 /// How the noise of a fit is modelled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoiseKind {
@@ -249,7 +252,7 @@ impl Base<'_> {
                 let name = self.model.name_of(i)?.to_owned();
                 let value = self.fit.theta[i];
                 let variance = covariance[i + k * i];
-                let half = 1.96 * variance.sqrt();
+                let half = QUANTILE * variance.sqrt();
                 let within = || [(value - half).max(bounds[i].0), (value + half).min(bounds[i].1)];
                 let ends = self.profiled.get(&name).copied().or_else(|| (variance > 0.0).then(within));
                 Some(Interval { name, value, ends, at_bound: self.fit.at_bound[i] })

@@ -12,7 +12,7 @@ use crate::budget::Step;
 use crate::evidence::{Projector, norm2};
 use crate::mechanism::{Places, Shape};
 use crate::model::Model;
-use crate::model::base::Base;
+use crate::model::base::{Base, QUANTILE};
 use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// Values on either side of where the shape stands, over one spacing.
@@ -30,8 +30,7 @@ const LEAST: f64 = 1e-3;
 /// Moments between the ends of a recording at which it is asked whether one says as much as another, and the log likelihood within which it does.
 const MOMENTS: usize = 200;
 const AS_GOOD: f64 = 0.05;
-/// Standard deviations of a 95 % interval; halvings of the way to a bound that are looked at, and cuts of the one in which the interval ends, each into so many parts.
-const QUANTILE: f64 = 1.96;
+/// Halvings of the way to a bound that are looked at, and cuts of the one in which the interval ends, each into so many parts.
 const HALVINGS: i32 = 24;
 const CUTS: usize = 3;
 const PARTS: u32 = 8;
