@@ -104,6 +104,12 @@ fn glitches(e: &[f64], y: &[f64]) -> Vec<(usize, f64)> {
     let scale = NORMAL * median(sizes.clone());
     let level = y.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
     let least = (BEYOND * scale).max(if level.is_finite() { LEVELS * level } else { 0.0 });
+    // A sensor at its limit holds back the outermost readings, and the course may be out there for one sample only.
+    let (lowest, highest) = y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
+    let held_back = |n: usize| {
+        let off = deviation(n);
+        (off < 0.0 && y[n] > highest - least) || (off > 0.0 && y[n] < lowest + least)
+    };
     let stands_out = |n: &usize| {
         let size = sizes[n - 1];
         let beside = [n.wrapping_sub(2), *n].map(|i| sizes.get(i).copied().unwrap_or(0.0));
@@ -113,6 +119,7 @@ fn glitches(e: &[f64], y: &[f64]) -> Vec<(usize, f64)> {
         let off_course = |course: f64| (e[*n] - course) * deviation(*n).signum() > OFF_COURSE * size;
         // A step shows at both of its sides, and its neighbours differ.
         size > least
+            && !held_back(*n)
             && beside.iter().all(|b| *b < size)
             && (e[n + 1] - e[n - 1]).abs() < size
             && [before, after].into_iter().flatten().all(off_course)
@@ -179,6 +186,25 @@ mod tests {
         assert_eq!(places(&swings), [0; 0]);
         swings[1234] += 40.0;
         assert_eq!(places(&swings), [1234]);
+    }
+
+    /// The one sample that goes beyond a sensor's limit is read at the limit, which no other reading reaches.
+    #[test]
+    fn the_outermost_reading_that_is_held_back_is_no_glitch() {
+        let mut random = normal(5);
+        let course = |n: u32| 50.0 * (0.9 * f64::from(n)).sin() + if n == 700 { 60.0 } else { 0.0 };
+        let noise: Vec<f64> = (0..2000).map(|_| 0.5 * random()).collect();
+        let limit = 70.0;
+        let read = |n: u32| course(n).min(limit) + noise[n as usize];
+        let y: Vec<f64> = (0..2000).map(read).collect();
+        let e: Vec<f64> = y.iter().zip(0..).map(|(y, n)| y - course(n)).collect();
+        assert!(course(700) > limit + 20.0, "{}", course(700));
+        assert_eq!(glitches(&e, &y).len(), 0);
+        // The same error on a reading within the range is a glitch.
+        let mut inside = noise.clone();
+        inside[800] -= course(700) - limit;
+        let y: Vec<f64> = inside.iter().zip(0..).map(|(e, n)| e + course(n)).collect();
+        assert_eq!(glitches(&inside, &y).len(), 1);
     }
 
     #[test]

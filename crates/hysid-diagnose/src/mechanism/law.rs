@@ -163,6 +163,8 @@ pub struct Law {
     pub never_baseline: bool,
     /// It is the sum of two other mechanisms of the catalogue: alone it says no more than they do together.
     pub sum_of_others: bool,
+    /// Its first two amplitudes are what it does above and below: see [`Mechanism::fitted_first`](super::Mechanism::fitted_first).
+    pub of_two_sides: bool,
 }
 
 impl Law {
@@ -174,6 +176,7 @@ impl Law {
             derived: Vec::new(),
             never_baseline: false,
             sum_of_others: false,
+            of_two_sides: false,
         }
     }
 
@@ -299,6 +302,13 @@ impl Law {
     #[must_use]
     pub fn searched(self) -> Self {
         self.last(|p| p.searched = true)
+    }
+
+    /// Its first two amplitudes are what it does above and below.
+    #[must_use]
+    pub fn of_two_sides(mut self) -> Self {
+        self.of_two_sides = true;
+        self
     }
 
     /// It is the sum of two other mechanisms of the catalogue.

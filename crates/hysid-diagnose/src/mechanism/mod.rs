@@ -31,6 +31,7 @@ mod drive;
 mod friction;
 mod hysteresis;
 mod input;
+mod limit;
 mod mode;
 pub mod numerics;
 mod path;
@@ -144,6 +145,24 @@ impl Mechanism {
         known
     }
 
+    /// What it is fitted as at first, where these are the amplitudes of its screening form that explain a residual best: a law of two sides of which one
+    /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below).
+    pub(crate) fn fitted_first(&self, slot: &Slot, amplitudes: &[(String, f64)]) -> Purpose {
+        match amplitudes {
+            [(_, above), (_, below)] if self.law_at(slot, Purpose::Screening).of_two_sides => {
+                let idle = |this: &f64, other: &f64| this.abs() < IDLE * other.abs();
+                if idle(below, above) {
+                    Purpose::Form(Form::Other)
+                } else if idle(above, below) {
+                    Purpose::Form(Form::Few)
+                } else {
+                    Purpose::Refit
+                }
+            }
+            _ => Purpose::Refit,
+        }
+    }
+
     /// The parameter of the simulation that this law can take the place of: the size of a law of another family, there already, that this one contains.
     /// Dahl's friction beside a dry friction of the simulation is the same friction twice.
     pub(crate) fn stands_for<'s>(&self, slot: &'s Slot) -> Option<&'s str> {
@@ -162,6 +181,9 @@ impl Mechanism {
         !self.needs.contains(&Need::Steps) || signals.resolution().is_some()
     }
 }
+
+/// Share of what a law does on one side below which it does nothing on the other.
+const IDLE: f64 = 0.3;
 
 /// Every mechanism, in the order of the families.
 pub fn catalogue() -> &'static [&'static Mechanism] {

@@ -184,10 +184,11 @@ pub fn screen(
         .par_iter()
         .filter_map(|(mechanism, slot, signals)| {
             let screening = mechanism.rewrite(&document, slot, signals, Purpose::Screening).ok()?;
-            let refit = mechanism.rewrite(&document, slot, signals, Purpose::Refit).ok()?;
             let mut points = features(base, &screening, slot, &values, own, r, total)?;
             points.sort_by(|a, b| b.score.total_cmp(&a.score));
             points.iter_mut().skip(JOINT).for_each(|p| p.joint = None);
+            let purpose = mechanism.fitted_first(slot, &points.first()?.amplitudes);
+            let refit = mechanism.rewrite(&document, slot, signals, purpose).ok()?;
             Some(Candidate { mechanism, slot: (*slot).clone(), refit, points, lacking: mechanism.lacking(signals) })
         })
         .collect();

@@ -130,16 +130,16 @@ impl Finder<'_> {
         self.motions.iter().filter_map(element).collect()
     }
 
-    /// What a deflection pulls with for each unit of it, in each term of the force on a part that holds it; `None` where there is none or one is not
-    /// linear.
+    /// What a deflection pulls with for each unit of it, in each term of the force on a part that is linear in it; `None` where there is none. Another
+    /// term may be what a first effect has put there.
     fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
         let terms = forces_of(self.simulation, part).filter(|(_, t)| t.uses(x));
         let all: Vec<Expr> = terms
-            .map(|(sign, term)| {
+            .filter_map(|(sign, term)| {
                 let rate = linear_coefficient(self.simulation, term, x)?;
                 Some(if sign < 0.0 { -rate } else { rate })
             })
-            .collect::<Option<_>>()?;
+            .collect();
         (!all.is_empty()).then_some(all)
     }
 
@@ -327,6 +327,18 @@ pub(super) mod tests {
         ];
         let found = slots(Place::Connection, &relative);
         assert_eq!(found, [["d", "w2", "-((-k/n - k/J)/(1/n + 1/J))", "-(1/n + 1/J)*w2 +w1"].map(str::to_owned)]);
+        // A first effect in an element leaves the second its place.
+        let stiffened = [
+            drifts[0],
+            ("v1", "-u - (k*d1 + c*v1 + n*d1^3) + (k*d2 + c*v2)", "m/s"),
+            drifts[2],
+            ("v2", "(k*d1 + c*v1 + n*d1^3) - 2*(k*d2 + c*v2)", "m/s"),
+            drifts[4],
+        ];
+        assert_eq!(
+            slots(Place::Connection, &stiffened).iter().map(|s| &s[..2]).collect::<Vec<_>>(),
+            [["d1", "v1"], ["d2", "v2"]]
+        );
         // A controller's reference is no ground.
         assert!(slots(Place::Connection, &[based[0], ("w2", "(k*(u - q2) - c*w2)/J", rate)]).is_empty());
         assert!(slots(Place::Connection, &twisted("w1 + w2", "(u - k*z)/J", "-k*z/J")).is_empty());

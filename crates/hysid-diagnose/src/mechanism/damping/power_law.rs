@@ -1,6 +1,6 @@
 //! Damping by a power of the velocity.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
 /// Damping by a power of the velocity.
@@ -11,10 +11,12 @@ pub static POWER_LAW_DAMPING: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("v"),
     already: &["abs(v)^P", "(abs(v)/P)^Q", "((v/P)^2 + Q)^((R - 1)/2)"],
-    law: |_, _| {
+    law: |_, purpose| {
         // The reference speed keeps the unit of F_p whatever the power. Below two hundredths of it the law is smooth: the derivative of a
-        // power below one is infinite at rest, and no fit survives that.
-        Law::force("F_p*v/v_r*((v/v_r)^2 + 0.0004)^((p_v - 1)/2)")
+        // power below one is infinite at rest, and no fit survives that from afar. From nearby it survives more, where the output shows the force:
+        // what the smooth law leaves at each turn would pass for dry friction.
+        let square = if purpose == Purpose::Form(Form::Finer) { "0.000004" } else { "0.0004" };
+        Law::force(format!("F_p*v/v_r*((v/v_r)^2 + {square})^((p_v - 1)/2)"))
             .amplitude("F_p", "F", -0.5, 1.0)
             .constant("v_r", "v", Grid::Values(vec![1.0]))
             .shape("p_v", "1", Grid::Values(vec![0.3, 0.5, 1.5, 2.5]))

@@ -1,6 +1,7 @@
 //! An input that does not grow beyond a limit.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere};
+use crate::mechanism::limit::{each_side, limited};
+use crate::mechanism::{Block, Family, Grid, Mechanism, Need, anywhere};
 use crate::slot::Place;
 
 /// An input that does not grow beyond a limit.
@@ -10,28 +11,23 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     block: Block::Input,
     places: &[Place::Input, Place::Between, Place::Command],
     applies: anywhere,
-    already: &["max(min(u, P), Q)", "min(max(u, P), Q)", "u - P*max(u - Q, 0)"],
+    already: &["max(min(u, P), Q)", "min(max(u, P), Q)", "min(u, P)", "max(u, P)", "u - P*max(u - Q, 0)"],
     law: |slot, purpose| {
         let level = Grid::Quantiles("u", vec![0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 0.997, 0.9995]);
         if slot.place == Place::Between {
             // A stage inside a circuit or a drive train rarely cuts alike on both sides, or off: a diode bends one side only.
-            return Law::replace("u - a_p*max(u - s, 0) - a_n*min(u + s, 0)")
+            return each_side("u")
                 .amplitude("a_p", "1", -1.0, 1.2)
                 .amplitude("a_n", "1", -1.0, 1.2)
                 .shape("s", "u", level)
                 .searched();
         }
-        match purpose {
-            Purpose::Screening => {
-                Law::replace("u + w*(max(min(u, s), -s) - u)").weight().shape("s", "u", level).searched()
-            }
-            Purpose::Refit | Purpose::Form(_) => Law::replace("max(min(u, s), -s)").shape("s", "u", level).searched(),
-        }
+        limited("u", level, purpose)
     },
     contains: &[],
     confusable: &["output_saturation", "input_polynomial"],
     needs: &[Need::Levels("u", 1.2)],
-    sentence: "The input saturates at {s} {place}; the simulation lets it grow.",
+    sentence: "The input saturates[ at {s}][ at no more than {s_p}][ at no less than {s_n}] {place}; the simulation lets it grow.",
     signature: "The residual lives only where the input is large.",
     reference: "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, Wiley (1996)",
 };

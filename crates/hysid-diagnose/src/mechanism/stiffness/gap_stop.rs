@@ -14,7 +14,7 @@ pub static GAP_STOP: Mechanism = Mechanism {
     law: |_, _| {
         Law::force("k_g*(max(x - g, 0) - max(-x - g, 0))")
             .amplitude("k_g", "F/x", -2.0, 50.0)
-            .shape("g", "x", Grid::Quantiles("x", vec![0.3, 0.45, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97, 0.99]))
+            .shape("g", "x", Grid::Quantiles("x", vec![0.3, 0.45, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97, 0.99, 0.998]))
             .searched()
     },
     contains: &[],

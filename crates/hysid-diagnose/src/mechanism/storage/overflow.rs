@@ -14,7 +14,7 @@ pub static OVERFLOW: Mechanism = Mechanism {
     law: |_, _| {
         Law::outflow("c_o*max(s - s_max, 0)")
             .amplitude("c_o", "F/s", 0.0, 20.0)
-            .shape("s_max", "s", Grid::SignedQuantiles("s", vec![0.6, 0.75, 0.85, 0.92, 0.97]))
+            .shape("s_max", "s", Grid::SignedQuantiles("s", vec![0.6, 0.75, 0.85, 0.92, 0.97, 0.99]))
             .searched()
     },
     contains: &[],
