@@ -24,38 +24,40 @@ const ROUNDING: f64 = 1e-9;
 
 /// The outputs of a simulation that measure derivatives of its states.
 pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
+    let rates: Vec<_> = simulation.states.iter().map(|s| (&s.name, peeled(&s.derivative))).collect();
     let mut found = Vec::new();
     for output in &simulation.outputs {
         let (factor, inner) = peeled(&output.expression);
-        for state in &simulation.states {
-            if shares(simulation, inner, &state.derivative)
-                && let Some(times) = multiple(simulation, inner, &state.derivative)
+        for (state, (scale, rate)) in &rates {
+            if shares(simulation, &inner, rate)
+                && let Some(times) = multiple(simulation, &inner, rate)
             {
-                let (state, column) = (state.name.clone(), output.column.clone());
-                found.push(Sensed { state, column, times: factor * times });
+                let (state, column) = ((*state).clone(), output.column.clone());
+                found.push(Sensed { state, column, times: factor / scale * times });
             }
         }
     }
     found
 }
 
-/// A factor that is a number, and what it multiplies.
-fn peeled(e: &Expr) -> (f64, &Expr) {
-    let under = |n: f64, e| {
-        let (factor, inner) = peeled(e);
-        (n * factor, inner)
-    };
+/// The numbers that a product or quotient has among its factors, and what they multiply: an acceleration in m/s^2 where the state is in mm.
+fn peeled(e: &Expr) -> (f64, Expr) {
+    let number = |n: f64| (n, Expr::Number(1.0));
     match e {
-        Expr::Neg(a) => under(-1.0, a),
-        Expr::Binary(BinaryOp::Mul, a, b) => match (&**a, &**b) {
-            (Expr::Number(n), other) | (other, Expr::Number(n)) => under(*n, other),
-            _ => (1.0, e),
-        },
-        Expr::Binary(BinaryOp::Div, a, b) => match **b {
-            Expr::Number(n) if n != 0.0 => under(1.0 / n, a),
-            _ => (1.0, e),
-        },
-        _ => (1.0, e),
+        Expr::Number(n) if *n != 0.0 => number(*n),
+        Expr::Neg(a) => {
+            let (factor, inner) = peeled(a);
+            (-factor, inner)
+        }
+        Expr::Binary(BinaryOp::Mul, a, b) => {
+            let ((first, a), (second, b)) = (peeled(a), peeled(b));
+            (first * second, a * b)
+        }
+        Expr::Binary(BinaryOp::Div, a, b) => {
+            let ((first, a), (second, b)) = (peeled(a), peeled(b));
+            (first / second, a / b)
+        }
+        _ => (1.0, e.clone()),
     }
 }
 
@@ -160,6 +162,14 @@ mod tests {
         assert_eq!(of("acc = \"-(1000*k*x + c*v + 3*x^3)/m - a + 0*x\""), one("v", "acc", 1.0));
         let in_g = of("acc_g = \"(-(3*x^3 + c*v + 1000*k*x)/m + 0.5*a)/9.81\"");
         assert!(in_g.len() == 1 && (in_g[0].2 - 1.0 / 9.81).abs() < 1e-12, "{in_g:?}");
+        // The numbers that turn one unit into the other may stand on either side.
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nf = \"force_kN\"\n[parameters]\nm = { value = 2.0, min = 0.1 }\nk = { value = 50.0, min = 1.0 }\n\
+             [states]\ns = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"RATE\", initial = 0.0 }\n[outputs]\nacc_m_s2 = \"(f - 0.001*v - k*s)/m\"\n";
+        for rate in ["(f - 0.001*v - k*s)/m*1000", "1000*(f - 0.001*v - k*s)/m", "1e6/(m*1000)*(f - 0.001*v - k*s)"] {
+            let simulation = Simulation::parse(&text.replace("RATE", rate), "test.sim.toml").unwrap();
+            let found = sensed(&simulation);
+            assert!(found.len() == 1 && (found[0].times - 1e-3).abs() < 1e-12, "{rate}: {found:?}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A spring whose stiffness changes at one point.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
 /// A spring whose stiffness changes at one point.
@@ -11,8 +11,10 @@ pub static BILINEAR_STIFFNESS: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("x"),
     already: &["max(x, 0)", "max(0, x)", "max(x - P, 0)", "max(0, x - P)", "step(x)*x", "x*step(x)"],
-    law: |_, _| {
-        Law::force("k_b*max(x - x_0, 0)")
+    law: |_, purpose| {
+        // Where the knee lies on the far side of the rest the spring may be slack there or at rest: the recording tells which.
+        let at_rest = if purpose == Purpose::Form(Form::Other) { " - max(-x_0, 0)" } else { "" };
+        Law::force(format!("k_b*(max(x - x_0, 0){at_rest})"))
             .amplitude("k_b", "F/x", -2.0, 50.0)
             .shape("x_0", "x", Grid::SignedQuantiles("x", vec![0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9]))
             .searched()
