@@ -24,6 +24,7 @@ use crate::openset::shapes::told_limit;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
 use crate::search::profile::{centre_moments, take_intervals};
+use crate::slot::with_balances;
 use crate::text::number;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
@@ -47,6 +48,8 @@ pub struct Diagnosis {
 /// # Errors
 /// Bad input; never a numerical event.
 pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, DiagnoseError> {
+    let balanced = with_balances(request.simulation);
+    let request = &Request { simulation: &balanced, ..*request };
     let (simulation, options) = (request.simulation, request.options);
     let Intake { whole, held, mut notes } = intake(request, hooks)?;
     (hooks.progress)("calibrating the simulation");

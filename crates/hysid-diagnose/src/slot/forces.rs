@@ -3,6 +3,7 @@
 use hysid_plant::{Expr, Output, State, Unit};
 
 use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, quotient, size};
+use super::balance::is_scaled;
 use super::find::{Finder, is_one_of};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
 use super::{Place, Pull, Slot, Target};
@@ -48,6 +49,10 @@ impl Finder<'_> {
         }
         if let Some(mass) = mass.filter(|m| only_parameters(simulation, m)) {
             slot.offer(simulation, "m", mass.clone());
+            // A mass in the units of force, length and time of the equations, which may be none that has a name.
+            if is_scaled(mass) {
+                slot.forget_unit("m");
+            }
         }
         if let Some(input) = simulation.inputs.iter().find(|i| force.uses(&i.symbol)) {
             slot.offer(simulation, "u", Expr::symbol(&input.symbol));

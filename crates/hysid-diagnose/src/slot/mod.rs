@@ -12,6 +12,7 @@
 //! of several states, the sum is.
 
 mod algebra;
+mod balance;
 mod commands;
 mod connections;
 mod find;
@@ -28,6 +29,7 @@ use hysid_plant::{Expr, Function, Simulation, Unit};
 
 pub use find::Structure;
 
+pub(crate) use balance::with_balances;
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
 
@@ -192,6 +194,13 @@ impl Slot {
     fn offer(&mut self, simulation: &Simulation, symbol: &str, expression: Expr) {
         let unit = simulation.unit_of_expr(&expression);
         self.symbols.insert(symbol.to_owned(), Quantity { expression, unit });
+    }
+
+    /// Leaves the unit of a symbol open.
+    fn forget_unit(&mut self, symbol: &str) {
+        if let Some(quantity) = self.symbols.get_mut(symbol) {
+            quantity.unit = None;
+        }
     }
 
     /// Whether a law can use this symbol here.
