@@ -213,7 +213,13 @@ impl Law {
     /// The weight `w` of a screening form; not reported.
     #[must_use]
     pub fn weight(self) -> Self {
-        self.amplitude("w", "1", -2.0, 2.0).silent()
+        self.weights(&["w"])
+    }
+
+    /// Several such weights.
+    #[must_use]
+    pub fn weights(self, names: &[&str]) -> Self {
+        names.iter().fold(self, |law, name| law.amplitude(*name, "1", -2.0, 2.0).silent())
     }
 
     /// An amplitude between `low` and `high` (multiples of `measure`).

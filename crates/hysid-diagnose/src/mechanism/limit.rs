@@ -13,12 +13,18 @@ pub(super) fn limited(signal: &'static str, level: Grid, purpose: Purpose) -> La
     };
     match purpose {
         Purpose::Screening => {
-            let sides = ["a_p", "a_n"];
-            let weighed = sides.into_iter().fold(each_side(signal), |law, a| law.amplitude(a, "1", -2.0, 2.0).silent());
-            weighed.shape("s", signal, level).searched().of_two_sides()
+            each_side(signal).weights(&["a_p", "a_n"]).shape("s", signal, level).searched().of_two_sides()
         }
         Purpose::Form(Form::Other) => one_sided(format!("min({signal}, s)")).report("s_p", signal, "s"),
         Purpose::Form(Form::Few) => one_sided(format!("max({signal}, -s)")).report("s_n", signal, "-s"),
+        // Two stops, each where it is.
+        Purpose::Form(Form::Finer) => at(format!("max(min({signal}, s), -s_n)"), level.clone())
+            .silent()
+            .shape("s_n", signal, level)
+            .searched()
+            .silent()
+            .report("s_p", signal, "s")
+            .report("s_n", signal, "-s_n"),
         Purpose::Refit | Purpose::Form(_) => at(format!("max(min({signal}, s), -s)"), level),
     }
 }

@@ -8,7 +8,7 @@ use hysid_plant::Simulation;
 use crate::budget::Budget;
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
-use crate::mechanism::{Mechanism, Rewritten};
+use crate::mechanism::{Mechanism, Places, Rewritten};
 use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
 use crate::model::{Count, Model, Values};
 use crate::refit::{LmOptions, go_on};
@@ -46,6 +46,11 @@ pub fn are_one_sum(a: (&Mechanism, &Slot), b: (&Mechanism, &Slot)) -> bool {
     a.0.family.members_imitate() && a.0.family == b.0.family && a.1.label == b.1.label
 }
 
+/// Share of the rows that must lie on either side of a moment; beside an effect with a memory, which forgets how it began only when its largest turns
+/// have come.
+const EITHER_SIDE: f64 = 0.03;
+const BESIDE_A_MEMORY: f64 = 0.1;
+
 impl Hypothesis<'_> {
     /// The statement that it makes.
     pub fn key(&self) -> Key {
@@ -69,6 +74,20 @@ impl Hypothesis<'_> {
     pub fn repeats_itself(&self) -> bool {
         let one = |a: &Effect, b: &Effect| are_one_sum((a.mechanism, &a.slot), (b.mechanism, &b.slot));
         self.effects.iter().enumerate().any(|(i, a)| self.effects[..i].iter().any(|b| one(a, b)))
+    }
+
+    /// Whether an effect of it begins at a moment so near to an end of the recording that it may be what a state that nobody knows leaves as it dies away.
+    pub fn changes_at_an_end(&self, effect: &Effect) -> bool {
+        let remembers = self.effects.iter().any(|e| e.mechanism.family.has_memory());
+        let least = if remembers { BESIDE_A_MEMORY } else { EITHER_SIDE };
+        let values = self.base.values();
+        let mut moments = effect.written.shapes.iter().filter(|shape| shape.places == Places::Moments);
+        moments.any(|shape| {
+            values.parameters.get(&shape.name).is_some_and(|moment| {
+                let before = self.base.model.data().share_before(*moment);
+                before < least || before > 1.0 - EITHER_SIDE
+            })
+        })
     }
 
     /// The families of its effects, sorted.

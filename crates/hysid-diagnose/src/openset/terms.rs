@@ -85,7 +85,13 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             meaning: s.meaning.clone(),
             held: held_beyond(s.meaning.clone(), x),
         };
-        let within: Arc<[Coordinate]> = symbols.iter().zip(&series).map(coordinate).collect();
+        let driving = |(u, x): &(&str, Series)| Coordinate {
+            name: (*u).to_owned(),
+            meaning: Expr::symbol(*u),
+            held: held_beyond(Expr::symbol(*u), x),
+        };
+        let within: Arc<[Coordinate]> =
+            symbols.iter().zip(&series).map(coordinate).chain(inputs.iter().map(driving)).collect();
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (symbols[i].name.as_str(), series[i].as_slice());
         found.extend((own..others).flat_map(|rate| shapes::limits(named(rate))));

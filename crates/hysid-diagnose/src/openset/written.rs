@@ -103,13 +103,7 @@ pub fn with_terms<'t>(
     terms: impl IntoIterator<Item = (&'t Term, f64)>,
 ) -> Option<(Simulation, Vec<Vec<String>>)> {
     let terms: Vec<(&Term, f64)> = terms.into_iter().collect();
-    // Beyond what was seen of a coordinate a curve says nothing: there it stays as it is at the end of the range, and with it what it balances
-    // within. Proportions and waves go on.
-    let mut curves: Vec<&Expr> = Vec::new();
-    for (term, _) in &terms {
-        let text = Expr::parse(&term.text).ok()?;
-        curves.extend(term.coordinates.iter().filter(|c| degree(&text, &c.name) > 1).map(|c| &c.meaning));
-    }
+    let curves = held(&terms)?;
     let mut names = Vec::new();
     let mut written = simulation.clone();
     let measured = measured(simulation);
@@ -148,6 +142,28 @@ pub fn with_terms<'t>(
         }
     }
     Some((written, names))
+}
+
+/// What is held at the ends of the range that was seen of it. Beyond that a curve says nothing: there it stays as it is, and with it what it balances within,
+/// and what a product multiplies it with. Proportions and waves go on.
+fn held<'t>(terms: &[(&'t Term, f64)]) -> Option<Vec<&'t Expr>> {
+    // The coordinates that grow in each term, with the degree at which they do.
+    let mut growing: Vec<Vec<(&Expr, usize)>> = Vec::new();
+    for (term, _) in terms {
+        let text = Expr::parse(&term.text).ok()?;
+        let of = |c: &'t Coordinate| (&c.meaning, degree(&text, &c.name));
+        growing.push(term.coordinates.iter().map(of).filter(|(_, degree)| *degree > 0).collect());
+    }
+    let mut held: Vec<&Expr> = growing.iter().flatten().filter(|(_, degree)| *degree > 1).map(|(c, _)| *c).collect();
+    loop {
+        let beside = |term: &&Vec<(&'t Expr, usize)>| term.iter().any(|(c, _)| held.contains(c));
+        let more: Vec<&Expr> =
+            growing.iter().filter(beside).flatten().map(|(c, _)| *c).filter(|c| !held.contains(c)).collect();
+        if more.is_empty() {
+            return Some(held);
+        }
+        held.extend(more);
+    }
 }
 
 /// Share of a cycle over the recording by which a frequency may move from where the periodogram found it.
@@ -238,6 +254,35 @@ mod tests {
         assert_eq!((x("u*v"), x("sign(x)*v"), x("v*cos(3*x)")), (0, 0, 0));
     }
 
+    #[test]
+    fn a_product_with_what_is_held_is_held_as_a_whole() {
+        let held_in = |texts: &[&str]| {
+            let terms: Vec<Term> = texts.iter().map(|text| term(text, &["u", "x", "y"])).collect();
+            let listed: Vec<(&Term, f64)> = terms.iter().map(|t| (t, 1.0)).collect();
+            let mut names: Vec<String> = held(&listed).unwrap().into_iter().map(ToString::to_string).collect();
+            names.sort();
+            names.dedup();
+            names.join(" ")
+        };
+        assert_eq!(held_in(&["u*x", "y"]), "");
+        assert_eq!(held_in(&["x^2", "y"]), "x");
+        assert_eq!(held_in(&["u*x", "x^2", "y"]), "u x");
+        assert_eq!(held_in(&["u*y", "x^2", "u*x"]), "u x y");
+    }
+
+    fn term(text: &str, coordinates: &[&str]) -> Term {
+        let coordinate = |n: &&str| Coordinate { name: (*n).into(), meaning: Expr::symbol(*n), held: Expr::symbol(*n) };
+        Term {
+            text: text.into(),
+            coordinates: coordinates.iter().map(coordinate).collect(),
+            place: Place::State(1),
+            kind: crate::openset::shapes::Kind::Odd,
+            side: "plant",
+            slot: "state:v".into(),
+            column: Vec::new(),
+        }
+    }
+
     /// Terms that were seen beside an effect stand in the simulation without it, and start anew there.
     #[test]
     fn terms_that_an_effect_left_stand_in_its_place() {
@@ -245,17 +290,7 @@ mod tests {
         let mut with_effect = plain.clone();
         with_effect.parameters.push(Parameter::new("h", 2.0).within(0.0, 9.0));
         with_effect.states[1].derivative = Expr::parse("(u - c*v - k*x - h*x^5)/m").unwrap();
-        let term = Term {
-            text: "x*abs(v)".into(),
-            coordinates: ["x", "v"]
-                .map(|n| Coordinate { name: n.into(), meaning: Expr::symbol(n), held: Expr::symbol(n) })
-                .into(),
-            place: Place::State(1),
-            kind: crate::openset::shapes::Kind::Odd,
-            side: "plant",
-            slot: "state:v".into(),
-            column: Vec::new(),
-        };
+        let term = term("x*abs(v)", &["x", "v"]);
         let beside = Sparse::new(with_effect, [(term, -3.0)].into_iter());
         let (written, names) = beside.within(plain.clone()).written().unwrap();
         assert!(written.parameter("h").is_none() && written.parameters.len() == plain.parameters.len() + 1);

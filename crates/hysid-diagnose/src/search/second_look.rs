@@ -54,7 +54,7 @@ impl<'d> Search<'_, 'd> {
     /// there are as many sets as can be made of the candidates, and sets of one size that say nearly the same (a dead zone before or behind a valve)
     /// stand together. That the noise model is an estimate is allowed for by [`ODDS_AGAINST`], but not
     /// where a set turns a coloured residual into a white one: there the simulation as it is has the best colour that could be found for it, and the set
-    /// has none to choose.
+    /// has none to choose. What changes at an end of the recording may be how it began (a play that the simulation has, and that an earlier input moved).
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
         let sets = |h: &Hypothesis<'_>| {
             (0..h.effects.len())
@@ -76,8 +76,9 @@ impl<'d> Search<'_, 'd> {
         let whitens = |h: &Hypothesis<'_>| !start.base.whitener.is_white() && h.base.whitener.is_white();
         let odds = |h: &Hypothesis<'_>| if whitens(h) { 1.0 } else { ODDS_AGAINST };
         let bound = |h: &Hypothesis<'_>| odds(h) * sets(h) * (none - evidence(h)).exp();
-        let best = fitted.iter().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
-        let p = together(fitted.iter().filter(|h| h.effects.len() == best.effects.len()).map(bound));
+        let fitted = || fitted.iter().filter(|h| !h.effects.iter().any(|e| h.changes_at_an_end(e)));
+        let best = fitted().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
+        let p = together(fitted().filter(|h| h.effects.len() == best.effects.len()).map(bound));
         (p < self.level() && self.holds_on_blocks(start, best)).then_some(p)
     }
 

@@ -226,6 +226,7 @@ impl Finder<'_> {
         let mut slot = Slot::new(Place::Connection, format!("state:{}", one.state), words, Target::Derivatives(pulls));
         slot.loops = self.loops(&v);
         slot.offer(self.simulation, "x", x);
+        let rate = v.clone();
         slot.offer(self.simulation, "v", v);
         let (force, divided) = force_of(self.simulation, one.derivative);
         let whole = |e: Expr| {
@@ -244,7 +245,9 @@ impl Finder<'_> {
             slot.offer(self.simulation, "k", whole(if sign < 0.0 { -k } else { k }));
         }
         if let Some(c) = other.and_then(|other| linear_coefficient(self.simulation, force, other.v)) {
-            slot.offer(self.simulation, "c", whole(c));
+            // For each unit of the rate, which may count the second velocity in another unit.
+            let count = other.and_then(|other| constant_coefficient(self.simulation, &rate, other.v));
+            slot.offer(self.simulation, "c", whole(count.map_or(c.clone(), |count| quotient(c, -count))));
         }
         slot.context = vec![one.derivative.clone()];
         slot.offer_own_sign(self.simulation);

@@ -1,7 +1,7 @@
 //! Outputs that measure what a force changes at once: an accelerometer's expression holds the forces of the equation of motion, and what is missing
 //! there is missing in the output too.
 
-use hysid_plant::{BinaryOp, ClockSource, Compiled, Drive, Expr, Output, Parameter, Run, Simulation};
+use hysid_plant::{BinaryOp, ClockSource, Compiled, Drive, Expr, Output, Parameter, Run, Simulation, Unit};
 use rand_pcg::rand_core::Rng;
 
 use crate::random::generator;
@@ -29,11 +29,18 @@ pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
     for output in &simulation.outputs {
         let (factor, inner) = peeled(&output.expression);
         for (state, (scale, rate)) in &rates {
-            if shares(simulation, &inner, rate)
-                && let Some(times) = multiple(simulation, &inner, rate)
-            {
-                let (state, column) = ((*state).clone(), output.column.clone());
-                found.push(Sensed { state, column, times: factor / scale * times });
+            if !shares(simulation, &inner, rate) {
+                continue;
+            }
+            let alike = |shaken| multiple(simulation, &inner, rate, shaken).map(|times| factor / scale * times);
+            let plainly = || alike(true).filter(|_| *scale == 1.0);
+            // Numbers among the factors or the terms of the rate may turn one unit into the other.
+            let converted = || {
+                let of_terms = || alike(false).filter(|_| states_in(simulation, &inner, rate) > 1);
+                alike(true).or_else(of_terms).filter(|times| converts(simulation, output, state, *times))
+            };
+            if let Some(times) = plainly().or_else(converted) {
+                found.push(Sensed { state: (*state).clone(), column: output.column.clone(), times });
             }
         }
     }
@@ -61,18 +68,34 @@ fn peeled(e: &Expr) -> (f64, Expr) {
     }
 }
 
+/// Whether a multiple of a state's rate may be nothing but a change of the unit: the output measures what the rate is, or, where the units are not told, it is
+/// a power of ten. What a controller puts out is a multiple of an acceleration where the mass is a number, and no accelerometer.
+fn converts(simulation: &Simulation, output: &Output, state: &str, times: f64) -> bool {
+    let second = Unit::parse("s").ok();
+    let rate = simulation.unit_of(state).zip(second).map(|(unit, second)| unit.per(&second));
+    match Unit::of_column(&output.column).zip(rate) {
+        Some((measured, rate)) => measured.same_dimension(&rate),
+        None => (times.abs().log10() - times.abs().log10().round()).abs() < 1e-9,
+    }
+}
+
+/// How many states two expressions have in common.
+fn states_in(simulation: &Simulation, a: &Expr, b: &Expr) -> usize {
+    simulation.states.iter().filter(|s| a.uses(&s.name) && b.uses(&s.name)).count()
+}
+
 /// Whether two expressions have a state and a parameter in common: forces in both.
 fn shares(simulation: &Simulation, a: &Expr, b: &Expr) -> bool {
     let both = |name: &str| a.uses(name) && b.uses(name);
-    simulation.states.iter().any(|s| both(&s.name)) && simulation.parameters.iter().any(|p| both(&p.name))
+    states_in(simulation, a, b) > 0 && simulation.parameters.iter().any(|p| both(&p.name))
 }
 
 /// The number by which `b` must be multiplied to move with the states as `a` does; `None` where there is none. It must be the same for other
-/// parameters, and for other numbers in the equations: `v` is a multiple of `(u - 2*v)/3` in one simulation only.
-fn multiple(simulation: &Simulation, a: &Expr, b: &Expr) -> Option<f64> {
+/// parameters, and where numbers are `shaking` for other numbers in the equations: `v` is a multiple of `(u - 2*v)/3` in one simulation only.
+fn multiple(simulation: &Simulation, a: &Expr, b: &Expr, shaking: bool) -> Option<f64> {
     let mut known: Option<f64> = None;
     for round in 0..3 {
-        let values = values(simulation, [a, b].map(|e| shaken(e, round)), round)?;
+        let values = values(simulation, [a, b].map(|e| if shaking { shaken(e, round) } else { e.clone() }), round)?;
         let (first, others) = values.split_first()?;
         let moved: Vec<[f64; 2]> = others.iter().map(|v| [v[0] - first[0], v[1] - first[1]]).collect();
         let most = |i: usize| moved.iter().map(|m| m[i].abs()).fold(0.0, f64::max);
@@ -163,13 +186,27 @@ mod tests {
         let in_g = of("acc_g = \"(-(3*x^3 + c*v + 1000*k*x)/m + 0.5*a)/9.81\"");
         assert!(in_g.len() == 1 && (in_g[0].2 - 1.0 / 9.81).abs() < 1e-12, "{in_g:?}");
         // The numbers that turn one unit into the other may stand on either side.
-        let text = "[time]\nperiod_s = 0.01\n[inputs]\nf = \"force_kN\"\n[parameters]\nm = { value = 2.0, min = 0.1 }\nk = { value = 50.0, min = 1.0 }\n\
-             [states]\ns = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"RATE\", initial = 0.0 }\n[outputs]\nacc_m_s2 = \"(f - 0.001*v - k*s)/m\"\n";
-        for rate in ["(f - 0.001*v - k*s)/m*1000", "1000*(f - 0.001*v - k*s)/m", "1e6/(m*1000)*(f - 0.001*v - k*s)"] {
-            let simulation = Simulation::parse(&text.replace("RATE", rate), "test.sim.toml").unwrap();
-            let found = sensed(&simulation);
-            assert!(found.len() == 1 && (found[0].times - 1e-3).abs() < 1e-12, "{rate}: {found:?}");
+        let times = |rate: &str, output: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nf = \"force_kN\"\n[parameters]\nm = {{ value = 2.0, min = 0.1 }}\nk = {{ value = 50.0, min = 1.0 }}\n\
+                 [states]\ns = {{ derivative = \"v\", initial = 0.0, unit = \"mm\" }}\nv = {{ derivative = \"{rate}\", initial = 0.0, unit = \"mm/s\" }}\n\
+                 [outputs]\n{output} = \"(f - 0.001*v - k*s)/m\"\n"
+            );
+            let found = sensed(&Simulation::parse(&text, "test.sim.toml").unwrap());
+            found.first().map(|s| s.times)
+        };
+        let thousandth = [
+            "(f - 0.001*v - k*s)/m*1000",
+            "1000*(f - 0.001*v - k*s)/m",
+            "1e6/(m*1000)*(f - 0.001*v - k*s)",
+            "(1000*f - v - 1000*k*s)/m",
+        ];
+        for rate in thousandth {
+            assert!(times(rate, "acc_m_s2").is_some_and(|t| (t - 1e-3).abs() < 1e-12), "{rate}");
+            // What a controller puts out is none, though it is a multiple as well.
+            assert_eq!(times(rate, "command_N"), None, "{rate}");
         }
+        assert_eq!(times("(f - 0.001*v - k*s)/m/0.7", "out"), None);
     }
 
     #[test]

@@ -8,7 +8,6 @@ use super::wanders::{Wanders, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
-use crate::mechanism::Places;
 use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::explore::Explored;
@@ -178,10 +177,6 @@ fn place_of(sets: &[(Key, f64)], key: &Key, least: f64) -> usize {
     best_place(sets, key).filter(|&i| sets[i].1 > least).unwrap_or(0)
 }
 
-/// Share of the rows that must lie on either side of a moment; beside an effect with a memory, which forgets how it began only when its largest turns
-/// have come.
-const EITHER_SIDE: f64 = 0.03;
-const BESIDE_A_MEMORY: f64 = 0.1;
 /// What a moment nearer to an end than that may be.
 const AT_AN_END: &str =
     "so near to an end of the recording a change is what a state that nobody knows leaves as it dies away";
@@ -189,22 +184,15 @@ const AT_AN_END: &str =
 /// What the recording lacks for a firm answer about each effect of the best set; `None` where nothing is lacking.
 fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String>> {
     let values = best.base.values();
-    let remembers = best.effects.iter().any(|e| e.mechanism.family.has_memory());
-    let at_an_end = |moment: f64| {
-        let before = best.base.model.data().share_before(moment);
-        before < if remembers { BESIDE_A_MEMORY } else { EITHER_SIDE } || before > 1.0 - EITHER_SIDE
-    };
     let told = |e: &Effect| {
         let id = e.mechanism.id;
+        let at_an_end = best.changes_at_an_end(e).then_some(AT_AN_END);
         let confused = e.written.shapes.iter().find_map(|shape| {
             let value = *values.parameters.get(&shape.name)?;
-            if shape.places == Places::Moments && at_an_end(value) {
-                return Some(AT_AN_END);
-            }
             let (from, below) = shape.told_from?;
             (value < from).then_some(below)
         });
-        if let Some(confused) = confused {
+        if let Some(confused) = at_an_end.or(confused) {
             return Some(format!("{id}: this is not firm, since {confused}"));
         }
         let candidate = candidates.iter().find(|c| c.mechanism.id == id && c.slot.is_at(&e.slot))?;

@@ -17,7 +17,8 @@ pub static POWER_LAW_DAMPING: Mechanism = Mechanism {
         // what the smooth law leaves at each turn would pass for dry friction.
         let square = if purpose == Purpose::Form(Form::Finer) { "0.000004" } else { "0.0004" };
         Law::force(format!("F_p*v/v_r*((v/v_r)^2 + {square})^((p_v - 1)/2)"))
-            .amplitude("F_p", "F", -0.5, 1.0)
+            // With less than none of it, beside the damping that the simulation has, it would be a dry friction that falls.
+            .amplitude("F_p", "F", 0.0, 1.0)
             .constant("v_r", "v", Grid::Values(vec![1.0]))
             .shape("p_v", "1", Grid::Values(vec![0.3, 0.5, 1.5, 2.5]))
             .within(0.1, 4.0)

@@ -1,6 +1,6 @@
 //! An input that does nothing while it is small.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere, log_steps};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere, log_steps};
 use crate::slot::Place;
 
 /// An input that does nothing while it is small.
@@ -13,17 +13,24 @@ pub static DEAD_ZONE: Mechanism = Mechanism {
     already: &["max(min(u, P), Q)", "max(u - P, 0)"],
     law: |_, purpose| {
         let width = Grid::Reach("u", log_steps(0.01, 0.5, 5));
+        let missing = |law: Law, name: &str| law.shape(name, "u", width.clone()).within(0.0, 3.0).neutral(0.0);
+        let held = |text: &str| missing(Law::replace(text), "d_z");
         match purpose {
-            Purpose::Screening => Law::replace("u - w*max(min(u, d_z), -d_z)").weight().shape("d_z", "u", width),
-            Purpose::Refit | Purpose::Form(_) => {
-                Law::replace("u - max(min(u, d_z), -d_z)").shape("d_z", "u", width).within(0.0, 3.0).neutral(0.0)
-            }
+            Purpose::Screening => Law::replace("u - w_p*max(min(u, d_z), 0) - w_n*min(max(u, -d_z), 0)")
+                .weights(&["w_p", "w_n"])
+                .shape("d_z", "u", width)
+                .of_two_sides(),
+            // A spool that overlaps on one side, or more on one than on the other.
+            Purpose::Form(Form::Other) => held("u - max(min(u, d_z), 0)"),
+            Purpose::Form(Form::Few) => held("u - min(max(u, -d_z), 0)"),
+            Purpose::Form(Form::Finer) => missing(held("u - max(min(u, d_z), -d_n)"), "d_n"),
+            Purpose::Refit | Purpose::Form(_) => held("u - max(min(u, d_z), -d_z)"),
         }
     },
     contains: &[],
     confusable: &["coulomb_friction", "input_polynomial"],
     needs: &[Need::Levels("u", 1.3)],
-    sentence: "The input does nothing below {d_z} {place}; the simulation has no dead zone.",
+    sentence: "The input does nothing below {d_z}[ (and {d_n} on the other side)] {place}; the simulation has no dead zone.",
     signature: "No response to small inputs; the missing part of the input is a clipped copy of it.",
     reference: "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, Wiley (1996)",
 };

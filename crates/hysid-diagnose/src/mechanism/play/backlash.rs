@@ -20,11 +20,12 @@ pub static BACKLASH: Mechanism = Mechanism {
             // Between two masses the dead-zone form: no force inside the gap of the coupling.
             _ => {
                 let gap = Grid::Reach("x", log_steps(0.02, 0.7, 6));
+                let open = |text: &str| Law::force(text).shape("r", "x", gap.clone()).within(0.0, 3.0).neutral(0.0);
                 return match purpose {
                     Purpose::Screening => Law::force("-w*k*max(min(x, r), -r)").weight().shape("r", "x", gap),
-                    Purpose::Refit | Purpose::Form(_) => {
-                        Law::force("-k*max(min(x, r), -r)").shape("r", "x", gap).within(0.0, 3.0).neutral(0.0)
-                    }
+                    // What damps in the contact of the teeth does nothing between them.
+                    Purpose::Form(Form::Other) if slot.has("c") => open("-k*max(min(x, r), -r) - c*v*step(r - abs(x))"),
+                    Purpose::Refit | Purpose::Form(_) => open("-k*max(min(x, r), -r)"),
                 };
             }
         };
