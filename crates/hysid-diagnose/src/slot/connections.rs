@@ -308,6 +308,10 @@ pub(super) mod tests {
         check(&twisted("w2 - w1", "(u + k*z)/J", "(-k*z - c*w2)/J"), ["z", "w2 - w1", "k", "-w2 +w1"]);
         check(&twisted("w1/n - w2", "(u - k*z/n)/J", "k*z/J"), ["z", "w1/n - w2", "k", "-1/n*w1 +w2"]);
         check(&twisted("k*(w1 - w2)", "(u - z)/J", "(z - c*w2)/J"), ["z", "k*(w1 - w2)", "1", "-w1 +w2"]);
+        // A damping is that for each unit of the rate of the deflection.
+        let milli = twisted("1000*(w1 - w2)", "(u - k*z - c*(w1 - w2))/J", "(k*z + c*(w1 - w2))/J");
+        let damping = slots_of(Place::Connection, &milli)[0].quantity("c").map(|q| q.expression.to_string());
+        assert_eq!(damping.as_deref(), Some("c/1000"));
         let based = [("q2", "w2", rad), ("w2", "(k*(u - q2) + c*(d(u) - w2))/J", rate)];
         check(&based, ["q2 - u", "w2 - d(u)", "k", "-w2"]);
         // Drifts of storeys: what an element pulls with stands in the equations of its neighbours.
