@@ -73,8 +73,10 @@ fn peeled(e: &Expr) -> (f64, Expr) {
 fn converts(simulation: &Simulation, output: &Output, state: &str, times: f64) -> bool {
     let second = Unit::parse("s").ok();
     let rate = simulation.unit_of(state).zip(second).map(|(unit, second)| unit.per(&second));
+    let is = |unit: &Unit, text: &str| Unit::parse(text).is_ok_and(|u| unit.same_dimension(&u));
     match Unit::of_column(&output.column).zip(rate) {
-        Some((measured, rate)) => measured.same_dimension(&rate),
+        // Of an accelerometer `g` is no gram.
+        Some((measured, rate)) => measured.same_dimension(&rate) || (is(&measured, "g") && is(&rate, "m/s^2")),
         None => (times.abs().log10() - times.abs().log10().round()).abs() < 1e-9,
     }
 }
@@ -202,7 +204,9 @@ mod tests {
             "(1000*f - v - 1000*k*s)/m",
         ];
         for rate in thousandth {
-            assert!(times(rate, "acc_m_s2").is_some_and(|t| (t - 1e-3).abs() < 1e-12), "{rate}");
+            for column in ["acc_m_s2", "acc_g"] {
+                assert!(times(rate, column).is_some_and(|t| (t - 1e-3).abs() < 1e-12), "{rate}");
+            }
             // What a controller puts out is none, though it is a multiple as well.
             assert_eq!(times(rate, "command_N"), None, "{rate}");
         }
