@@ -111,13 +111,27 @@ fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let best = &pool[winner];
     let Some(twin) = best.effects[member].mechanism.family.twin() else { return false };
     let rest = best.key_without(member);
-    let refuted = if passes_between_samples(best, member) { REFUTED_BUT_FOR_THE_START } else { REFUTED };
+    let refuted = if passes_between_samples(best, member) {
+        REFUTED_BUT_FOR_THE_START
+    } else if is_a_loop_without_a_spring(best, member) {
+        REFUTED.max(LITTLE * (best.base.log_likelihood - pool[0].base.log_likelihood))
+    } else {
+        REFUTED
+    };
     pool.iter().any(|h| {
         let of_twin = h.effects.iter().position(|e| e.mechanism.family == twin);
         h.effects.len() == best.effects.len()
             && of_twin.is_some_and(|place| h.key_without(place) == rest)
             && h.base.log_likelihood > best.base.log_likelihood - refuted
     })
+}
+
+/// Whether a member is a loop on a part that no spring of the simulation holds, as a drive: a hysteretic spring and a friction that gives way elastically
+/// are one thing there, and which law says it a little better tells no name (a LuGre friction was told as a Bouc-Wen loop, firm, 20 of 330 nats ahead:
+/// report of seed 2417, 0011).
+fn is_a_loop_without_a_spring(h: &Hypothesis<'_>, member: usize) -> bool {
+    let effect = &h.effects[member];
+    matches!(effect.mechanism.family, Family::HystereticSpring | Family::Presliding) && !effect.slot.has("k")
 }
 
 /// Whether a member is a lag shorter than a sample: its transient passes between the samples, where a delay, a lag of a sensor and that of a
