@@ -35,6 +35,13 @@ pub struct Coordinate {
     pub held: Expr,
 }
 
+impl Coordinate {
+    /// Of what it stands for and the series of that.
+    fn new(name: &str, meaning: Expr, x: &Series) -> Self {
+        Self { name: name.to_owned(), held: held_beyond(meaning.clone(), x), meaning }
+    }
+}
+
 /// One generic signal at one place.
 #[derive(Debug, Clone)]
 pub struct Term {
@@ -80,18 +87,9 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let radians = radians.and_then(|_| series.pop()?.first()?.first().copied());
         let inputs: Vec<(&str, Series)> =
             inputs.iter().map(|u| u.symbol.as_str()).zip(series.split_off(symbols.len())).collect();
-        let coordinate = |(s, x): (&&Symbol, &Series)| Coordinate {
-            name: s.name.clone(),
-            meaning: s.meaning.clone(),
-            held: held_beyond(s.meaning.clone(), x),
-        };
-        let driving = |(u, x): &(&str, Series)| Coordinate {
-            name: (*u).to_owned(),
-            meaning: Expr::symbol(*u),
-            held: held_beyond(Expr::symbol(*u), x),
-        };
-        let within: Arc<[Coordinate]> =
-            symbols.iter().zip(&series).map(coordinate).chain(inputs.iter().map(driving)).collect();
+        let own_and_others = symbols.iter().zip(&series).map(|(s, x)| Coordinate::new(&s.name, s.meaning.clone(), x));
+        let driving = inputs.iter().map(|(u, x)| Coordinate::new(u, Expr::symbol(*u), x));
+        let within: Arc<[Coordinate]> = own_and_others.chain(driving).collect();
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (symbols[i].name.as_str(), series[i].as_slice());
         found.extend((own..others).flat_map(|rate| shapes::limits(named(rate))));

@@ -46,33 +46,69 @@ pub(crate) fn linear_coefficient(simulation: &Simulation, expr: &Expr, symbol: &
     found.reduce(|a, b| a + b).map(|c| c.simplified())
 }
 
-/// `above/below` without the factors that both have.
-pub(crate) fn quotient(above: Expr, below: Expr) -> Expr {
-    fn collect(product: Expr, above: &mut Vec<Expr>, below: &mut Vec<Expr>, positive: &mut bool) {
+/// The factors of a product: those above the line and those below it, but for ones.
+pub(super) struct Factors {
+    pub above: Vec<Expr>,
+    pub below: Vec<Expr>,
+    pub positive: bool,
+}
+
+impl Factors {
+    /// Of `above/below`.
+    fn of_quotient(above: Expr, below: Expr) -> Self {
+        let mut factors = Self { above: Vec::new(), below: Vec::new(), positive: true };
+        factors.collect(above, false);
+        factors.collect(below, true);
+        factors
+    }
+
+    pub fn of(product: Expr) -> Self {
+        Self::of_quotient(product, Expr::Number(1.0))
+    }
+
+    fn collect(&mut self, product: Expr, inverted: bool) {
         match product {
             Expr::Binary(BinaryOp::Mul, a, b) => {
-                collect(*a, above, below, positive);
-                collect(*b, above, below, positive);
+                self.collect(*a, inverted);
+                self.collect(*b, inverted);
             }
             Expr::Binary(BinaryOp::Div, a, b) => {
-                collect(*a, above, below, positive);
-                collect(*b, below, above, positive);
+                self.collect(*a, inverted);
+                self.collect(*b, !inverted);
             }
             Expr::Neg(a) => {
-                *positive = !*positive;
-                collect(*a, above, below, positive);
+                self.positive = !self.positive;
+                self.collect(*a, inverted);
             }
             Expr::Number(n) if n < 0.0 => {
-                *positive = !*positive;
-                collect(Expr::Number(-n), above, below, positive);
+                self.positive = !self.positive;
+                self.collect(Expr::Number(-n), inverted);
             }
             Expr::Number(1.0) => {}
-            other => above.push(other),
+            other if inverted => self.below.push(other),
+            other => self.above.push(other),
         }
     }
-    let (mut up, mut down, mut positive) = (Vec::new(), Vec::new(), true);
-    collect(above, &mut up, &mut down, &mut positive);
-    collect(below, &mut down, &mut up, &mut positive);
+
+    /// The number that those of the factors make which are numbers, taken out of them. A zero stays.
+    pub fn take_number(&mut self) -> f64 {
+        let take = |factors: &mut Vec<Expr>| {
+            let numbers = factors.extract_if(.., |e| matches!(e, Expr::Number(n) if *n != 0.0));
+            numbers.map(|e| if let Expr::Number(n) = e { n } else { 1.0 }).product::<f64>()
+        };
+        let size = take(&mut self.above) / take(&mut self.below);
+        if self.positive { size } else { -size }
+    }
+}
+
+/// The product of these factors.
+pub(super) fn product(factors: Vec<Expr>) -> Expr {
+    factors.into_iter().reduce(|a, b| a * b).unwrap_or(Expr::Number(1.0))
+}
+
+/// `above/below` without the factors that both have.
+pub(crate) fn quotient(above: Expr, below: Expr) -> Expr {
+    let Factors { above: mut up, below: mut down, positive } = Factors::of_quotient(above, below);
     up.retain(|a| match down.iter().position(|b| a == b) {
         Some(at) => {
             down.remove(at);
@@ -80,7 +116,6 @@ pub(crate) fn quotient(above: Expr, below: Expr) -> Expr {
         }
         None => true,
     });
-    let product = |factors: Vec<Expr>| factors.into_iter().reduce(|a, b| a * b).unwrap_or(Expr::Number(1.0));
     let found = (product(up) / product(down)).simplified();
     if positive { found } else { -found }
 }

@@ -5,6 +5,8 @@
 
 use hysid_plant::{BinaryOp, Expr, Simulation};
 
+use super::algebra::{Factors, product};
+
 /// The same simulation with such numbers in the mass: `(F - c*v - k*x)/(m/1000)`.
 pub(crate) fn with_balances(simulation: &Simulation) -> Simulation {
     let mut out = simulation.clone();
@@ -18,53 +20,21 @@ pub(crate) fn with_balances(simulation: &Simulation) -> Simulation {
 
 /// Whether a number other than one is among the factors of a mass.
 pub(super) fn is_scaled(mass: &Expr) -> bool {
-    let mut factors = Factors::default();
-    factors.collect(mass, false);
-    factors.number != 1.0
-}
-
-/// The factors of a product.
-#[derive(Default)]
-struct Factors {
-    above: Vec<Expr>,
-    below: Vec<Expr>,
-    number: f64,
-    begun: bool,
-}
-
-impl Factors {
-    fn collect(&mut self, product: &Expr, inverted: bool) {
-        if !self.begun {
-            (self.number, self.begun) = (1.0, true);
-        }
-        match product {
-            Expr::Number(n) if inverted => self.number /= n,
-            Expr::Number(n) => self.number *= n,
-            Expr::Binary(BinaryOp::Mul, a, b) => {
-                self.collect(a, inverted);
-                self.collect(b, inverted);
-            }
-            Expr::Binary(BinaryOp::Div, a, b) => {
-                self.collect(a, inverted);
-                self.collect(b, !inverted);
-            }
-            other if inverted => self.below.push(other.clone()),
-            other => self.above.push(other.clone()),
-        }
-    }
+    Factors::of(mass.clone()).take_number().abs() != 1.0
 }
 
 /// A sum of forces times a number over a mass as the sum over the mass in that number's unit; `None` for anything else, and where there is no number.
 fn balance(derivative: &Expr) -> Option<Expr> {
-    let mut factors = Factors::default();
-    factors.collect(derivative, false);
-    let Factors { above, below, number, .. } = factors;
-    let [sum] = <[Expr; 1]>::try_from(above).ok()?;
-    let mass = below.into_iter().reduce(|a, b| a * b)?;
+    let mut factors = Factors::of(derivative.clone());
+    let number = factors.take_number();
+    let [sum] = <[Expr; 1]>::try_from(factors.above).ok()?;
     let is_sum = matches!(sum, Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..));
     // A minus before it all would make the mass negative.
-    (is_sum && number > 0.0 && number.is_finite() && number != 1.0)
-        .then(|| sum / if number < 1.0 { mass * (1.0 / number) } else { mass / number })
+    if factors.below.is_empty() || !is_sum || !(number > 0.0 && number.is_finite()) || number == 1.0 {
+        return None;
+    }
+    let mass = product(factors.below);
+    Some(sum / if number < 1.0 { mass * (1.0 / number) } else { mass / number })
 }
 
 #[cfg(test)]

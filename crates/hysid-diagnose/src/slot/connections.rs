@@ -226,8 +226,7 @@ impl Finder<'_> {
         let mut slot = Slot::new(Place::Connection, format!("state:{}", one.state), words, Target::Derivatives(pulls));
         slot.loops = self.loops(&v);
         slot.offer(self.simulation, "x", x);
-        let rate = v.clone();
-        slot.offer(self.simulation, "v", v);
+        slot.offer(self.simulation, "v", v.clone());
         let (force, divided) = force_of(self.simulation, one.derivative);
         let whole = |e: Expr| {
             let e = match divided {
@@ -246,7 +245,7 @@ impl Finder<'_> {
         }
         if let Some(c) = other.and_then(|other| linear_coefficient(self.simulation, force, other.v)) {
             // For each unit of the rate, which may count the second velocity in another unit.
-            let count = other.and_then(|other| constant_coefficient(self.simulation, &rate, other.v));
+            let count = other.and_then(|other| constant_coefficient(self.simulation, &v, other.v));
             slot.offer(self.simulation, "c", whole(count.map_or(c.clone(), |count| quotient(c, -count))));
         }
         slot.context = vec![one.derivative.clone()];

@@ -3,6 +3,7 @@
 use hysid_plant::{BinaryOp, Expr, Simulation, State, Unit};
 
 use super::algebra::{constant_coefficient, only_parameters};
+use super::find::is_one_of;
 
 /// How forces enter the derivative of a velocity.
 pub(crate) enum ForcePath<'a> {
@@ -88,10 +89,9 @@ pub(super) fn kinematic(unit: Option<&Unit>, name: &str) -> Kinematic {
             _ => Kinematic::Neither,
         };
     };
-    let like = |text: &str| Unit::parse(text).is_ok_and(|u| unit.same_dimension(&u));
-    if like("m") || angle(unit).is_some() {
+    if is_one_of(unit, &["m"]) || angle(unit).is_some() {
         Kinematic::Displacement
-    } else if like("m/s") || matches!(unit.to_string().as_str(), "rad/s" | "deg/s" | "rev/s" | "rpm") {
+    } else if is_one_of(unit, &["m/s"]) || matches!(unit.to_string().as_str(), "rad/s" | "deg/s" | "rev/s" | "rpm") {
         Kinematic::Velocity
     } else {
         Kinematic::Neither

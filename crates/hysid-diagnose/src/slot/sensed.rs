@@ -4,6 +4,8 @@
 use hysid_plant::{BinaryOp, ClockSource, Compiled, Drive, Expr, Output, Parameter, Run, Simulation, Unit};
 use rand_pcg::rand_core::Rng;
 
+use super::algebra::{Factors, product};
+use super::find::is_one_of;
 use crate::random::generator;
 
 /// An output that is a multiple of the derivative of a state, but for what no state moves.
@@ -32,14 +34,18 @@ pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
             if !shares(simulation, &inner, rate) {
                 continue;
             }
-            let alike = |shaken| multiple(simulation, &inner, rate, shaken).map(|times| factor / scale * times);
-            let plainly = || alike(true).filter(|_| *scale == 1.0);
-            // Numbers among the factors or the terms of the rate may turn one unit into the other.
-            let converted = || {
-                let of_terms = || alike(false).filter(|_| states_in(simulation, &inner, rate) > 1);
-                alike(true).or_else(of_terms).filter(|times| converts(simulation, output, state, *times))
+            let alike = |shaking| multiple(simulation, &inner, rate, shaking).map(|times| factor / scale * times);
+            let with_any_numbers = alike(true);
+            let times = if with_any_numbers.is_some() && *scale == 1.0 {
+                with_any_numbers
+            } else {
+                // Numbers among the factors or the terms of the rate may turn one unit into the other.
+                let units = measures_a_rate(simulation, output, state);
+                let of_terms = || if states_in(simulation, &inner, rate) > 1 { alike(false) } else { None };
+                let converted = || with_any_numbers.or_else(of_terms);
+                (units != Some(false)).then(converted).flatten().filter(|t| units.is_some() || is_power_of_ten(*t))
             };
-            if let Some(times) = plainly().or_else(converted) {
+            if let Some(times) = times {
                 found.push(Sensed { state: (*state).clone(), column: output.column.clone(), times });
             }
         }
@@ -49,36 +55,24 @@ pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
 
 /// The numbers that a product or quotient has among its factors, and what they multiply: an acceleration in m/s^2 where the state is in mm.
 fn peeled(e: &Expr) -> (f64, Expr) {
-    let number = |n: f64| (n, Expr::Number(1.0));
-    match e {
-        Expr::Number(n) if *n != 0.0 => number(*n),
-        Expr::Neg(a) => {
-            let (factor, inner) = peeled(a);
-            (-factor, inner)
-        }
-        Expr::Binary(BinaryOp::Mul, a, b) => {
-            let ((first, a), (second, b)) = (peeled(a), peeled(b));
-            (first * second, a * b)
-        }
-        Expr::Binary(BinaryOp::Div, a, b) => {
-            let ((first, a), (second, b)) = (peeled(a), peeled(b));
-            (first / second, a / b)
-        }
-        _ => (1.0, e.clone()),
-    }
+    let mut factors = Factors::of(e.clone());
+    let number = factors.take_number();
+    (number, product(factors.above) / product(factors.below))
 }
 
-/// Whether a multiple of a state's rate may be nothing but a change of the unit: the output measures what the rate is, or, where the units are not told, it is
-/// a power of ten. What a controller puts out is a multiple of an acceleration where the mass is a number, and no accelerometer.
-fn converts(simulation: &Simulation, output: &Output, state: &str, times: f64) -> bool {
-    let second = Unit::parse("s").ok();
-    let rate = simulation.unit_of(state).zip(second).map(|(unit, second)| unit.per(&second));
-    let is = |unit: &Unit, text: &str| Unit::parse(text).is_ok_and(|u| unit.same_dimension(&u));
-    match Unit::of_column(&output.column).zip(rate) {
-        // Of an accelerometer `g` is no gram.
-        Some((measured, rate)) => measured.same_dimension(&rate) || (is(&measured, "g") && is(&rate, "m/s^2")),
-        None => (times.abs().log10() - times.abs().log10().round()).abs() < 1e-9,
-    }
+/// Whether an output measures what the rate of a state is, by their units; `None` where these are not told. What a controller puts out is a multiple of an
+/// acceleration where the mass is a number, and no accelerometer.
+fn measures_a_rate(simulation: &Simulation, output: &Output, state: &str) -> Option<bool> {
+    let rate = simulation.unit_of(state)?.per(&Unit::parse("s").ok()?);
+    let measured = Unit::of_column(&output.column)?;
+    // Of an accelerometer `g` is no gram.
+    Some(measured.same_dimension(&rate) || (is_one_of(&measured, &["g"]) && is_one_of(&rate, &["m/s^2"])))
+}
+
+/// Whether a multiple may be nothing but a change of the unit.
+fn is_power_of_ten(times: f64) -> bool {
+    let decades = times.abs().log10();
+    (decades - decades.round()).abs() < 1e-9
 }
 
 /// How many states two expressions have in common.

@@ -75,13 +75,17 @@ pub fn firmness(
 /// Share of the likelihood that a set gains below which a member may make up for what a sum of plays leaves of the loop.
 const LITTLE: f64 = 0.1;
 
+/// The log likelihood that a set gains over the simulation as it is, which comes first in a pool.
+fn gained(pool: &[Hypothesis<'_>], h: &Hypothesis<'_>) -> f64 {
+    h.base.log_likelihood - pool[0].base.log_likelihood
+}
+
 /// Whether a set gains most of its likelihood without a member: where the rest is a sum of a few plays, that is what their number leaves (a resonance
 /// was firm beside plays whose thresholds grow with the rate by another law).
 fn brings_little(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
-    let gained = |h: &Hypothesis<'_>| h.base.log_likelihood - pool[0].base.log_likelihood;
     let best = &pool[winner];
     best_that_says(pool, &best.key_without(member))
-        .is_some_and(|rest| gained(&pool[rest]) > (1.0 - LITTLE) * gained(best))
+        .is_some_and(|rest| gained(pool, &pool[rest]) > (1.0 - LITTLE) * gained(pool, best))
 }
 
 /// Whether a family has one member only: no sibling can be meant where that does not fit.
@@ -114,7 +118,7 @@ fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let refuted = if passes_between_samples(best, member) {
         REFUTED_BUT_FOR_THE_START
     } else if is_a_loop_without_a_spring(best, member) {
-        REFUTED.max(LITTLE * (best.base.log_likelihood - pool[0].base.log_likelihood))
+        REFUTED.max(LITTLE * gained(pool, best))
     } else {
         REFUTED
     };
