@@ -202,7 +202,8 @@ fn a_half_width_may_grow_with_the_step_from_the_sample_before() {
         let compiled = model(hold, &[("r", 0.2), ("s", 1.5), ("h", 0.01)], &states, &outputs);
         let y = simulate(&compiled, &drive(3000, amplitude), 2);
         let sample = |n: i32| amplitude(0.01 * f64::from(n.max(0)));
-        let mut widening = amplitude(0.0);
+        // An argument that came from 0 has taken it along by the first sample.
+        let mut widening = 0.0_f64;
         for i in 0..3000 * points {
             let (n, share) = (i / points, f64::from(i % points) / f64::from(points));
             let at = |n: i32| sample(n) + share * (sample(n + 1) - sample(n));

@@ -131,7 +131,7 @@ pub fn curves(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<Shape> {
                 *w = w.max(v - r).min(v + r);
                 *w
             };
-            Shape::new(format!("play({name}, {})", free(r)), Kind::Play, in_turn(x, |first| first, play))
+            Shape::new(format!("play({name}, {})", free(r)), Kind::Play, in_turn(x, |_| 0.0, play))
         }));
     }
     out

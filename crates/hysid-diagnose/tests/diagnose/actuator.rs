@@ -45,8 +45,8 @@ fn answer(
     noise: f64,
     mut random: impl FnMut() -> f64,
 ) -> Recording {
-    // At rest before: each play in the middle of its band.
-    let (mut held, mut before) = (vec![u[0]; plays.len()], u[0]);
+    // At rest before, without an input.
+    let (mut held, mut before) = (vec![0.0_f64; plays.len()], u[0]);
     let y = u.iter().map(|&u| {
         let wider = 1.0 + widening * (u - before).abs();
         before = u;

@@ -2,8 +2,8 @@
 //!
 //! A cell holds what the operator remembers as of the last commit. Within a step the operator's value follows from the cell,
 //! the argument now and the time since the commit; nothing changes until the step is accepted and committed. At the first
-//! sample each is at rest: play in the middle of its band, lag settled, delay filled with the first value, relay at -1
-//! unless its argument is above the upper threshold.
+//! sample each is as a machine that was at rest: play came from 0 (the initial output of the field's literature), lag settled, delay filled with the first
+//! value, relay at -1 unless its argument is above the upper threshold.
 //!
 //! - `lag` is exact for an argument that is linear between commits (so for every input, held or linear); within a
 //!   step a derivative sees what makes the step's integrals exact, however short the time constant.
@@ -181,11 +181,11 @@ impl<N: Number> Cell<N> {
 
     #[inline(always)]
     pub fn play(&mut self, w: N, half_width: N) -> N {
+        let r = half_width.max(N::lift(0.0));
         if !self.filled {
             self.filled = true;
-            self.held = w;
+            self.held = N::lift(0.0).max(w.sub(r)).min(w.add(r));
         }
-        let r = half_width.max(N::lift(0.0));
         let value = self.held.max(w.sub(r)).min(w.add(r));
         self.now = (w, value);
         value

@@ -55,7 +55,7 @@ impl Plays {
         }
     }
 
-    /// The plays of a law that always begin in the middle.
+    /// The plays of a law that always came from 0.
     pub fn settled(purpose: Purpose) -> Self {
         Self(match purpose {
             Purpose::Form(Form::Unsettled) => Purpose::Form(Form::Other),
@@ -69,7 +69,7 @@ impl Plays {
         matches!(self.0, Purpose::Form(Form::Unsettled | Form::FinerUnsettled))
     }
 
-    /// A play of this half-width, as text: in the middle at the first sample, or where an input that came from `u_s` has moved it by then.
+    /// A play of this half-width, as text: where an input that came from 0, or from `u_s`, has moved it by the first sample.
     pub fn play(self, radius: &str) -> String {
         if self.unsettled() { moved_play("u", radius, "u_s") } else { format!("play(u, {radius})") }
     }
@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// Plays that came from somewhere answer as the settled ones do to the same input with the way from there before it.
+    /// Plays that came from somewhere answer as those that came from 0 do to an input that is counted from there.
     #[test]
     fn what_was_before_the_recording_is_one_value() {
         let input: Vec<f64> = (0..200).map(|i| 5.0 + 2.0 * (0.1 * f64::from(i)).sin() + 0.01 * f64::from(i)).collect();
@@ -183,12 +183,13 @@ mod tests {
             (Purpose::Refit, Purpose::Form(Form::Unsettled)),
             (Purpose::Form(Form::Finer), Purpose::Form(Form::FinerUnsettled)),
         ] {
-            for from in [0.0, 3.0, 5.0, 6.5, 20.0] {
+            for from in [-3.0, 0.0, 3.0, 5.0, 6.5, 20.0] {
                 let mut set = values(unsettled);
                 set.push(("u_s", from));
                 let (found, _) = answer(unsettled, &set, &input);
-                let (expected, _) = answer(settled, &values(settled), &[&[from], &input[..]].concat());
-                let apart = found.iter().zip(&expected[1..]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                let counted: Vec<f64> = input.iter().map(|u| u - from).collect();
+                let (expected, _) = answer(settled, &values(settled), &counted);
+                let apart = found.iter().zip(&expected).map(|(a, b)| (a - b - from).abs()).fold(0.0, f64::max);
                 assert!(apart < 1e-9, "{unsettled:?} from {from}: {apart}");
             }
         }

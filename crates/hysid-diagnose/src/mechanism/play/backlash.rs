@@ -35,8 +35,8 @@ pub static BACKLASH: Mechanism = Mechanism {
             Purpose::Screening => {
                 Law::replace(format!("{signal} + w*(play({signal}, r) - {signal})")).weight().shape("r", signal, width)
             }
-            // A machine that was at rest: a first value beyond the play has taken it along. On a drive that integrates the difference stays.
-            Purpose::Form(Form::Unsettled) => with_duration(wide(moved_play(signal, "r", "0"))),
+            // In the middle of its band. On a drive that integrates the difference stays.
+            Purpose::Form(Form::Unsettled) => with_duration(wide(moved_play(signal, "r", signal))),
             // One that was moving already.
             Purpose::Form(Form::FinerUnsettled) => with_duration(wide(moved_play(signal, "r", "w_s")))
                 .shape("w_s", signal, Grid::Values(vec![-2.0, 0.0, 2.0]))
