@@ -3,6 +3,7 @@
 
 use super::profile::profile_shapes;
 use crate::budget::Step;
+use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// The end of a fit: shapes that least squares cannot move, of the effects from `from` on, then a round under the hypothesis' own noise.
@@ -13,11 +14,25 @@ pub fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
     if setting.budget.omits(Step::Fits) {
         return;
     }
-    let polished = setting.further(&h.base, Some(&h.base.whitener), 1, setting.iterations);
-    if let Some(p) = polished
-        && p.log_likelihood > h.base.log_likelihood
-    {
+    if let Some(p) = likelier(&h.base, setting.further(&h.base, Some(&h.base.whitener), 1, setting.iterations)) {
+        h.base = p;
+    }
+    if let Some(p) = without_slight_colour(setting, &h.base) {
         h.base = p;
     }
     h.log_evidence = setting.evidence(&h.base);
+}
+
+/// Where the noise of a fit has a slight colour: the fit that begins under white noise, if that is likelier.
+///
+/// The noise model of the simulation without the effect has the colour of what was missing. Fitted under it, parameters may keep a slow error that the
+/// noise model passes over, and this error keeps the noise model as it is.
+pub fn without_slight_colour<'d>(setting: &Setting<'d>, base: &Base<'d>) -> Option<Base<'d>> {
+    let slight = base.whitener.coefficients() > 0 && !base.coloured();
+    likelier(base, slight.then(|| setting.further(base, None, 2, setting.iterations))?)
+}
+
+/// Another fit of the same simulation, if it is likelier.
+fn likelier<'d>(base: &Base<'d>, other: Option<Base<'d>>) -> Option<Base<'d>> {
+    other.filter(|o| o.log_likelihood > base.log_likelihood)
 }

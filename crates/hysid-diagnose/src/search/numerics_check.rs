@@ -1,5 +1,6 @@
 //! Is it the simulation's own numerics? Variants of hold, clock and smoothing, fitted like any other explanation.
 
+use super::finish::without_slight_colour;
 use crate::budget::Step;
 use crate::mechanism::numerics::{SHARPER, SOLVER_ARTEFACT, variants};
 use crate::mechanism::{Purpose, Rewritten};
@@ -50,6 +51,13 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
                 _ => break,
             }
         }
+    }
+    if let Some(b) = &mut best
+        && !setting.budget.omits(Step::Numerics)
+        && let Some(base) = without_slight_colour(setting, &b.base)
+    {
+        b.log_evidence = setting.evidence(&base);
+        b.base = base;
     }
     best
 }
