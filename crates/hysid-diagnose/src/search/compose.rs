@@ -9,6 +9,7 @@ use super::joint::pairs;
 use super::parted::parted;
 use super::rivals::{include, rivals_of, short_list};
 use super::screen::Candidate;
+use super::simpler::simplify;
 use crate::budget::Step;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
@@ -173,6 +174,9 @@ pub fn compose<'d>(
         let stands = |pool: &[Hypothesis<'_>]| best_of(pool).is_none_or(|b| pool[b].key() == before);
         if stands(pool) && !enough() {
             beside_the_second(setting, none, pool, n, ask);
+        }
+        if stands(pool) {
+            simplify(setting, none, pool);
         }
         if stands(pool) {
             break;

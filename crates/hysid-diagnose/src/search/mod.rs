@@ -21,6 +21,7 @@ pub mod ripple;
 pub mod rivals;
 pub mod screen;
 pub mod second_look;
+pub mod simpler;
 pub mod starts;
 
 use std::cell::RefCell;
