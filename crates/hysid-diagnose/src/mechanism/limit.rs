@@ -2,36 +2,43 @@
 
 use super::{Form, Grid, Law, Purpose};
 
-/// A limit of a signal alike on both sides, at one of these levels at first, or on one side only: a valve has one stop, and of a converter's ends one may
-/// be within reach.
-pub(super) fn limited(signal: &'static str, level: Grid, purpose: Purpose) -> Law {
+/// A limit of a signal alike on both sides, at one of these quantiles at first, or on one side only: a valve has one stop, and of a converter's ends one
+/// may be within reach. A lower limit is counted as far below the median of the signal, `s_o`, as an upper one stands above it: a temperature or a
+/// level never comes near zero.
+pub(super) fn limited(signal: &'static str, quantiles: &[f64], purpose: Purpose) -> Law {
+    let above = || Grid::SignedQuantiles(signal, quantiles.to_vec());
     let at = |text: String, level: Grid| Law::replace(text).shape("s", signal, level).searched();
-    // The level of one side may have either sign.
-    let one_sided = |text: String| {
-        let levels = Grid::Values(vec![-2.0, -1.2, -0.6, -0.2, 0.2, 0.6, 1.2, 2.0, 3.0]);
-        at(text, levels).within(-6.0, 6.0).silent()
-    };
+    let about = |law: Law| law.constant("s_o", signal, Grid::SignedQuantiles(signal, vec![0.5])).silent();
     match purpose {
-        Purpose::Screening => {
-            each_side(signal).weights(&["a_p", "a_n"]).shape("s", signal, level).searched().of_two_sides()
+        Purpose::Screening => about(
+            each_side(signal, &format!("{signal} - (2*s_o - s)"))
+                .weights(&["a_p", "a_n"])
+                .shape("s", signal, above())
+                .searched()
+                .of_two_sides(),
+        ),
+        Purpose::Form(Form::Other) => at(format!("min({signal}, s)"), above()).silent().report("s_p", signal, "s"),
+        Purpose::Form(Form::Few) => {
+            about(at(format!("max({signal}, 2*s_o - s)"), above()).silent()).report("s_n", signal, "2*s_o - s")
         }
-        Purpose::Form(Form::Other) => one_sided(format!("min({signal}, s)")).report("s_p", signal, "s"),
-        Purpose::Form(Form::Few) => one_sided(format!("max({signal}, -s)")).report("s_n", signal, "-s"),
         // Two stops, each where it is.
-        Purpose::Form(Form::Finer) => at(format!("max(min({signal}, s), -s_n)"), level.clone())
-            .silent()
-            .shape("s_n", signal, level)
-            .searched()
-            .silent()
-            .report("s_p", signal, "s")
-            .report("s_n", signal, "-s_n"),
-        Purpose::Refit | Purpose::Form(_) => at(format!("max(min({signal}, s), -s)"), level),
+        Purpose::Form(Form::Finer) => {
+            let upper = at(format!("max(min({signal}, s), 2*s_o - s_n)"), above()).silent();
+            about(upper.shape("s_n", signal, above()).searched().silent()).report("s_p", signal, "s").report(
+                "s_n",
+                signal,
+                "2*s_o - s_n",
+            )
+        }
+        Purpose::Refit | Purpose::Form(_) => {
+            at(format!("max(min({signal}, s), -s)"), Grid::Quantiles(signal, quantiles.to_vec()))
+        }
     }
 }
 
-/// What is beyond a level taken off with a share for each side.
-pub(super) fn each_side(signal: &str) -> Law {
-    Law::replace(format!("{signal} - a_p*max({signal} - s, 0) - a_n*min({signal} + s, 0)"))
+/// What is above `s`, and what of a signal counted from a lower level is negative, taken off with a share for each side.
+pub(super) fn each_side(signal: &str, from_below: &str) -> Law {
+    Law::replace(format!("{signal} - a_p*max({signal} - s, 0) - a_n*min({from_below}, 0)"))
 }
 
 #[cfg(test)]

@@ -70,3 +70,21 @@ fn an_offset_beside_white_noise_is_no_noise() {
     // The noise of the sensor is left.
     assert!(d.fit[0].rmse_after.is_some_and(|r| r < 1.1 * 0.004), "{:?}", d.fit);
 }
+
+/// A gauge that counts from far below and reads no more than so much.
+#[test]
+fn a_gauge_that_stops_is_named_however_far_from_zero_it_reads() {
+    let (datum, most) = (40.0, 41.0);
+    let of = |name: &str, seed| {
+        let quiet = recording(name, "inflow_m3_s", seed, |u| u);
+        let mut channels = quiet.channels().to_vec();
+        let mut random = normal(seed + 10);
+        channels[1].samples.iter_mut().for_each(|y| *y = (*y + datum).min(most) + 0.002 * random());
+        Recording::new(name, quiet.clock(), channels).unwrap()
+    };
+    let text = baseline("inflow_m3_s").replace("\"h\"\n", "\"h + 40\"\n");
+    let d = run(&text, &[of("est.csv", 1)], &[of("val.csv", 2)]).unwrap().file;
+    let effect = d.effects.first().expect(&d.summary);
+    assert_eq!((effect.mechanism.as_str(), d.verdict), ("output_saturation", VerdictKind::Named), "{}", d.summary);
+    assert!((effect.parameters[0].value - most).abs() < 0.01, "{:?}", effect.parameters);
+}

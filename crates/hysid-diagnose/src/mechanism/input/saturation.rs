@@ -13,16 +13,16 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     applies: anywhere,
     already: &["max(min(u, P), Q)", "min(max(u, P), Q)", "min(u, P)", "max(u, P)", "u - P*max(u - Q, 0)"],
     law: |slot, purpose| {
-        let level = Grid::Quantiles("u", vec![0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 0.997, 0.9995]);
+        let quantiles = [0.5, 0.65, 0.8, 0.9, 0.95, 0.99, 0.997, 0.9995];
         if slot.place == Place::Between {
             // A stage inside a circuit or a drive train rarely cuts alike on both sides, or off: a diode bends one side only.
-            return each_side("u")
+            return each_side("u", "u + s")
                 .amplitude("a_p", "1", -1.0, 1.2)
                 .amplitude("a_n", "1", -1.0, 1.2)
-                .shape("s", "u", level)
+                .shape("s", "u", Grid::Quantiles("u", quantiles.to_vec()))
                 .searched();
         }
-        limited("u", level, purpose)
+        limited("u", &quantiles, purpose)
     },
     contains: &[],
     confusable: &["output_saturation", "input_polynomial"],

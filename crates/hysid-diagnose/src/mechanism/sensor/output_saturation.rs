@@ -1,7 +1,7 @@
 //! A sensor that does not go beyond a limit.
 
 use crate::mechanism::limit::limited;
-use crate::mechanism::{Block, Family, Grid, Mechanism, anywhere};
+use crate::mechanism::{Block, Family, Mechanism, anywhere};
 use crate::slot::Place;
 
 /// A sensor that does not go beyond a limit.
@@ -12,9 +12,7 @@ pub static OUTPUT_SATURATION: Mechanism = Mechanism {
     places: &[Place::Sensor],
     applies: anywhere,
     already: &["max(min(y, P), Q)", "min(max(y, P), Q)", "min(y, P)", "max(y, P)"],
-    law: |_, purpose| {
-        limited("y", Grid::Quantiles("y", vec![0.5, 0.7, 0.85, 0.93, 0.98, 0.995, 0.999, 0.9998]), purpose)
-    },
+    law: |_, purpose| limited("y", &[0.5, 0.7, 0.85, 0.93, 0.98, 0.995, 0.999, 0.9998], purpose),
     contains: &[],
     confusable: &["input_saturation", "cubic_stiffness", "gap_stop"],
     needs: &[],
