@@ -24,7 +24,7 @@ use crate::openset::shapes::told_limit;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
 use crate::search::profile::{centre_moments, take_intervals};
-use crate::slot::with_balances;
+use crate::slot::{with_balances, with_turns, with_used_turns};
 use crate::text::number;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
@@ -48,8 +48,9 @@ pub struct Diagnosis {
 /// # Errors
 /// Bad input; never a numerical event.
 pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, DiagnoseError> {
-    let balanced = with_balances(request.simulation);
-    let request = &Request { simulation: &balanced, ..*request };
+    let user = request.simulation;
+    let prepared = with_turns(&with_balances(user));
+    let request = &Request { simulation: &prepared, ..*request };
     let (simulation, options) = (request.simulation, request.options);
     let Intake { whole, held, mut notes } = intake(request, hooks)?;
     (hooks.progress)("calibrating the simulation");
@@ -117,10 +118,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.notes.extend(best.effects.iter().zip(&wandering).filter_map(|(e, w)| w.as_ref()?.in_place_of(e)));
 
     (hooks.progress)("scoring on the hold-out");
-    let baseline = pool[0].base.document();
+    let baseline = with_used_turns(&pool[0].base.document(), user);
     let kept = if set > 0 { &pool[set] } else { best };
     let last = modelled.as_ref().unwrap_or(kept);
-    let augmented = modelled.as_ref().or((set > 0).then_some(kept)).map(|h| h.base.document());
+    let augmented = modelled.as_ref().or((set > 0).then_some(kept)).map(|h| with_used_turns(&h.base.document(), user));
     let before = free_run(&baseline, &held, setting.substeps);
     let after = augmented.as_ref().and_then(|a| free_run(a, &held, setting.substeps));
     if let Some(run) = &before {

@@ -6,6 +6,8 @@ mod actuator;
 mod held;
 #[path = "common/oscillator.rs"]
 mod oscillator;
+#[path = "diagnose/rotor.rs"]
+mod rotor;
 #[path = "diagnose/sensed.rs"]
 mod sensed;
 #[path = "diagnose/store.rs"]

@@ -9,13 +9,14 @@ use std::collections::BTreeMap;
 use hysid_plant::{Expr, Simulation};
 
 use super::{Mechanism, Purpose, Signals, Value, catalogue};
-use crate::slot::{Slot, Structure};
+use crate::slot::{Slot, Structure, with_turns};
 
 pub use motion::{Bench, example_recording, jumping_recording};
 
 /// Base simulations of every kind of plant that the catalogue knows.
 pub fn specimens() -> Vec<Simulation> {
-    SPECIMENS.iter().filter_map(|(name, text)| Simulation::parse(text, name).ok()).collect()
+    let prepared = |text: &str, name: &str| Some(with_turns(&Simulation::parse(text, name).ok()?));
+    SPECIMENS.iter().filter_map(|(name, text)| prepared(text, name)).collect()
 }
 
 macro_rules! specimens {

@@ -2,7 +2,7 @@
 
 use hysid_plant::{Expr, Simulation, Slot as Place};
 
-use crate::slot::Structure;
+use crate::slot::{Structure, is_turn};
 
 /// A signal that terms are written over.
 #[derive(Debug, Clone)]
@@ -54,7 +54,9 @@ const OTHERS: usize = 6;
 
 /// The places of a simulation at which generic terms act.
 pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
-    let states = (0..simulation.states.len()).map(|i| of_state(simulation, structure, i));
+    // Over an angle that nothing uses there is nothing but what returns with the turn, and the catalogue has that.
+    let used = |i: &usize| !is_turn(simulation, &simulation.states[*i].name);
+    let states = (0..simulation.states.len()).filter(used).map(|i| of_state(simulation, structure, i));
     let has_slot = |label: &String| structure.slots.iter().any(|s| s.label == *label);
     let inputs = simulation.inputs.iter().enumerate().filter(|_| !simulation.is_static()).map(|(i, input)| Site {
         place: Place::Input(i),
@@ -107,6 +109,6 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
 /// pull), and in proportion where the simulation has no parameter for it (two axes that a spinning wheel couples).
 fn others(simulation: &Simulation, own: &[Symbol]) -> Vec<Symbol> {
     let known: Vec<String> = own.iter().flat_map(|s| s.meaning.symbols()).collect();
-    let states = simulation.states.iter().map(|s| s.name.as_str());
+    let states = simulation.states.iter().map(|s| s.name.as_str()).filter(|name| !is_turn(simulation, name));
     states.filter(|name| known.iter().all(|k| k != name)).take(OTHERS).map(Symbol::itself).collect()
 }

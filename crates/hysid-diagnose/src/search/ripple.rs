@@ -37,10 +37,10 @@ const PLACES: f64 = 3.0;
 /// none where nothing moves far enough.
 pub fn residual_periods(base: &Base<'_>, structure: &Structure, r: &[f64]) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new(); structure.slots.len()];
-    let moves = |s: &Slot| matches!(s.place, Place::Force | Place::ForceLaw) && s.has("x");
+    let position = |s: &'_ Slot| s.quantity("x").or(s.quantity("turn")).map(|x| x.expression.clone());
+    let moves = |s: &Slot| matches!(s.place, Place::Force | Place::ForceLaw) && position(s).is_some();
     let places: Vec<usize> = (0..structure.slots.len()).filter(|&i| moves(&structure.slots[i])).take(MOST.0).collect();
-    let positions: Vec<Expr> =
-        places.iter().filter_map(|&i| Some(structure.slots[i].quantity("x")?.expression.clone())).collect();
+    let positions: Vec<Expr> = places.iter().filter_map(|&i| position(&structure.slots[i])).collect();
     let Some(along) = along(base, &positions).filter(|_| !places.is_empty()) else { return out };
     let rulers: Vec<Option<Ruler>> = along.iter().map(|x| Ruler::of(x)).collect();
     if rulers.iter().all(Option::is_none) {

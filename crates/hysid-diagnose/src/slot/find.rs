@@ -165,7 +165,8 @@ impl Finder<'_> {
         let known = |name: &str| self.original.state(name).is_some();
         let mut links: Vec<(&str, Vec<String>)> = Vec::new();
         for source in self.simulation.states.iter().filter(|s| known(&s.name)) {
-            let integrates = |name: &str| self.motions.iter().any(|m| m.v == source.name && m.x == Some(name));
+            let integrates =
+                |name: &str| self.motions.iter().any(|m| m.v == source.name && [m.x, m.turn].contains(&Some(name)));
             let driven: Vec<String> = self
                 .simulation
                 .states
@@ -234,6 +235,9 @@ impl Finder<'_> {
         }
         if let Some(x) = motion.x {
             slot.offer(self.simulation, "x", Expr::symbol(x));
+        }
+        if let Some(turn) = motion.turn {
+            slot.offer(self.simulation, "turn", Expr::symbol(turn));
         }
     }
 

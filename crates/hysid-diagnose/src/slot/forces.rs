@@ -84,6 +84,10 @@ impl Finder<'_> {
                 slot.offer(self.simulation, "rad", rad);
             }
         }
+        if let Some(rad) = motion.turn.and_then(|turn| self.simulation.state(turn)) {
+            let rad = linear_coefficient(self.simulation, &rad.derivative, motion.v);
+            slot.offer(self.simulation, "rad", rad.unwrap_or(Expr::Number(1.0)));
+        }
         self.offer_force(&mut slot, motion.derivative, motion.x, motion.v, motion.scale.as_ref());
         slot.context = vec![motion.derivative.clone()];
         slot.offer_own_sign(self.simulation);

@@ -21,6 +21,7 @@ mod loops;
 mod motion;
 mod pattern;
 mod sensed;
+mod turn;
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -32,6 +33,7 @@ pub use find::Structure;
 pub(crate) use balance::with_balances;
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
+pub(crate) use turn::{is_turn, with_turns, with_used_turns};
 
 /// Signs of a velocity that a simulation may have: the sharp one, then the smoothed ones that may stand in its place.
 pub(crate) const SIGNS: [&str; 8] = [

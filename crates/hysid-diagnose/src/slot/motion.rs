@@ -4,6 +4,7 @@ use hysid_plant::{BinaryOp, Expr, Simulation, State, Unit};
 
 use super::algebra::{constant_coefficient, only_parameters};
 use super::find::is_one_of;
+use super::turn::is_turn;
 
 /// How forces enter the derivative of a velocity.
 pub(crate) enum ForcePath<'a> {
@@ -49,6 +50,8 @@ pub(super) fn force_of<'a>(simulation: &Simulation, derivative: &'a Expr) -> (&'
 /// A moving part: a velocity, mostly with its displacement.
 pub(super) struct Motion<'a> {
     pub x: Option<&'a str>,
+    /// The angle that was added where it turns and the user's simulation has its speed only.
+    pub turn: Option<&'a str>,
     pub v: &'a str,
     /// The state whose derivative holds the forces: the velocity, or what is integrated to it.
     pub state: &'a str,
@@ -121,7 +124,10 @@ fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Ex
 }
 
 pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> Vec<Motion<'a>> {
-    let known = || simulation.states.iter().filter(|s| original.state(&s.name).is_some());
+    let of_the_user = |s: &&State| original.state(&s.name).is_some();
+    let (turns, others): (Vec<&State>, Vec<&State>) =
+        simulation.states.iter().filter(of_the_user).partition(|s| is_turn(original, &s.name));
+    let known = || others.iter().copied();
     let mut found = Vec::new();
     for velocity in known() {
         let scaled = |s: &&State| scale(simulation, s, &velocity.name);
@@ -142,6 +148,7 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
         let (x, v) = first.map_or((position, velocity), |(x, v)| (Some(x), v));
         found.push(Motion {
             x: x.map(|s| s.name.as_str()),
+            turn: turns.iter().find(|s| s.derivative.uses(&v.name)).map(|s| s.name.as_str()),
             v: &v.name,
             state: &velocity.name,
             derivative: &velocity.derivative,

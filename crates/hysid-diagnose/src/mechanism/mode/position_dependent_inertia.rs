@@ -9,13 +9,15 @@ pub static POSITION_DEPENDENT_INERTIA: Mechanism = Mechanism {
     family: Family::Inertia,
     block: Block::Inertia,
     places: &[Place::Force],
-    applies: |slot| slot.has("x") && slot.has_own_coordinate() && !slot.shows("x*v^2") && !slot.mass_varies(),
+    applies: |slot| {
+        (slot.has("turn") || slot.has("x") && slot.has_own_coordinate()) && !slot.shows("x*v^2") && !slot.mass_varies()
+    },
     already: &[],
     law: |slot, purpose| {
         // A crank's inertia comes back with each turn, mostly twice, an eccentric arm's once.
         match purpose {
             _ if !slot.has("rad") => with_the_square(slot),
-            Purpose::Form(Form::Other) => with_the_square(slot),
+            Purpose::Form(Form::Other) if slot.has("x") => with_the_square(slot),
             Purpose::Screening => {
                 over_the_turn(slot, "n_w").shape("n_w", "1", Grid::Values(vec![2.0, 1.0])).within(0.5, 4.0)
             }
@@ -44,7 +46,7 @@ fn with_the_square(slot: &Slot) -> Law {
 
 /// A wave of so many periods a turn, at any phase, with nothing more where the angle is zero.
 fn over_the_turn(slot: &Slot, periods: &str) -> Law {
-    let angle = format!("{periods}*rad*x");
+    let angle = format!("{periods}*{}", if slot.has("turn") { "turn" } else { "rad*x" });
     let force = format!("0.5*{periods}*rad*(m_c*sin({angle}) + m_s*cos({angle}))*{}", squared_velocity(slot));
     Law::inertia(force, format!("m_c*(1 - cos({angle})) + m_s*sin({angle})"))
         .amplitude("m_c", slot.mass_measure(), -0.4, 2.0)

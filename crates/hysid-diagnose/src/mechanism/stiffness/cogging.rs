@@ -9,15 +9,16 @@ pub static COGGING: Mechanism = Mechanism {
     family: Family::PositionRipple,
     block: Block::Restoring,
     places: &[Place::Force, Place::ForceLaw],
-    applies: |slot| slot.has("x"),
+    applies: |slot| slot.has("x") || slot.has("turn"),
     already: &["sin(2*pi*x/P)", "sin(2*pi/P*x)", "sin(P*x)", "sin(P*x + Q)"],
-    law: |_, _| {
-        Law::force("A_s*sin(2*pi*x/p_x) + A_c*cos(2*pi*x/p_x)")
+    law: |slot, _| {
+        let x = if slot.has("x") { "x" } else { "turn" };
+        Law::force(format!("A_s*sin(2*pi*{x}/p_x) + A_c*cos(2*pi*{x}/p_x)"))
             .amplitude("A_s", "F", -1.0, 1.0)
             .silent()
             .amplitude("A_c", "F", -1.0, 1.0)
             .silent()
-            .shape("p_x", "x", Grid::Turns("x", log_steps(0.05, 1.0, 40)))
+            .shape("p_x", x, Grid::Turns(x, log_steps(0.05, 1.0, 40)))
             // Three standard deviations are about the whole travel: a longer period is a curved spring and no ripple.
             .within(2e-4, 3.0)
             .searched()

@@ -9,12 +9,14 @@ pub static GRAVITY: Mechanism = Mechanism {
     family: Family::Gravity,
     block: Block::Restoring,
     places: &[Place::Force],
-    applies: |slot| slot.has("x") && slot.has("rad"),
+    applies: |slot| (slot.has("x") && slot.has("rad")) || slot.has("turn"),
     already: &["sin(rad*x)", "sin(x)", "sin(P*x)", "sin(x*P)", "sin(x + P)", "sin(x - P)", "cos(x)", "cos(x + P)"],
-    law: |_, purpose| {
+    law: |slot, purpose| {
+        // What turns and is out of balance is pulled as an arm is.
+        let angle = if slot.has("turn") { "turn" } else { "rad*x" };
         // An angle is mostly counted from where the arm hangs or from where it is level.
         let one = |name: &str, wave: &str, phase: &str| {
-            Law::force(format!("{name}*{wave}(rad*x)"))
+            Law::force(format!("{name}*{wave}({angle})"))
                 .amplitude(name, "F", -2.0, 2.0)
                 .silent()
                 .report("G", "F", format!("abs({name})"))
@@ -25,7 +27,10 @@ pub static GRAVITY: Mechanism = Mechanism {
             Purpose::Form(Form::Few) => return one("G_c", "cos", "atan2(G_c, 0)"),
             _ => {}
         }
-        Law::force("G_s*sin(rad*x) + G_c*cos(rad*x)")
+        // An input may be counted from what holds the arm at the zero of its angle.
+        let level =
+            if purpose == Purpose::Form(Form::Finer) { format!("(cos({angle}) - 1)") } else { format!("cos({angle})") };
+        Law::force(format!("G_s*sin({angle}) + G_c*{level}"))
             .amplitude("G_s", "F", -2.0, 2.0)
             .silent()
             .amplitude("G_c", "F", -2.0, 2.0)
