@@ -6,6 +6,7 @@
 
 pub(crate) mod firmness;
 pub(crate) mod judgement;
+mod place;
 pub mod reliability;
 mod remaining;
 pub(crate) mod trifles;

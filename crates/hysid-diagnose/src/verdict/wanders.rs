@@ -1,8 +1,10 @@
 //! Whether a parameter wanders or oscillates where an effect of a set says that it changes once, drifts or follows a temperature.
 //!
 //! Each of these takes a good part of what a parameter does that never rests. Such a parameter is not of the catalogue: it is heard as a rival of each of
-//! these effects, around the set without that effect.
+//! these effects, around the set without that effect. So is what depends on the place, where the recording was on either side of a level only before and
+//! only after the moment of a change.
 
+use super::place::place_of_change;
 use super::weigh::EVIDENCE_WEIGHT;
 use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
@@ -20,6 +22,8 @@ pub struct Wanders {
     pub words: String,
 }
 
+/// The probability that a change depends on the place where that explains it as well: as likely, and another recording is safer without it.
+const AS_WELL: f64 = 0.6;
 /// Below this probability nothing is said of it.
 const WORTH_SAYING: f64 = 0.02;
 
@@ -41,6 +45,9 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
     let of = |member: usize| {
         if best.effects[member].mechanism.family != Family::TimeVariation {
             return None;
+        }
+        if let Some(words) = place_of_change(best, &best.effects[member]) {
+            return Some(Wanders { probability: AS_WELL, words });
         }
         let rest = &pool[best_that_says(pool, &best.key_without(member))?];
         let kind = search.setting.noise;
