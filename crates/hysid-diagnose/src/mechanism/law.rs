@@ -36,11 +36,15 @@ pub enum Form {
     Unsettled,
     /// Such a memory, of more terms.
     FinerUnsettled,
+    /// Without a knee: a limit that is approached as a hyperbolic tangent approaches one.
+    Soft,
+    /// The same, as a hyperbola approaches one.
+    Softer,
 }
 
 impl Purpose {
     /// What a law is fitted as, in the order in which the forms are tried.
-    pub const FITTED: [Self; 7] = [
+    pub const FITTED: [Self; 9] = [
         Self::Refit,
         Self::Form(Form::Unsettled),
         Self::Form(Form::Other),
@@ -48,6 +52,8 @@ impl Purpose {
         Self::Form(Form::Finer),
         Self::Form(Form::FinerUnsettled),
         Self::Form(Form::Spaced),
+        Self::Form(Form::Soft),
+        Self::Form(Form::Softer),
     ];
 }
 
