@@ -2,7 +2,7 @@
 
 use hysid_plant::{Expr, Function, Memory};
 
-use super::algebra::size;
+use super::algebra::{Factors, size};
 use super::find::Finder;
 use super::motion::{ForcePath, Kinematic, force_path};
 use super::{Place, Pull, Slot, Target};
@@ -18,11 +18,11 @@ impl Finder<'_> {
     /// Whether a state besides the motions has a loop in this velocity.
     pub(super) fn loops(&self, v: &Expr) -> bool {
         let others = self.simulation.states.iter().filter(|s| !self.moves(&s.name));
-        others.into_iter().any(|s| size_of(&s.derivative, |a| a == v).is_some())
+        others.into_iter().any(|s| speed_of(&s.derivative, &s.name, |a| a == v).is_some())
     }
 
     fn own_loop(&self, name: &str, derivative: &Expr) -> Option<Slot> {
-        let v = size_of(derivative, |a| !a.uses(name) && self.is_velocity(a))?;
+        let v = speed_of(derivative, name, |a| self.is_velocity(a))?;
         let target = Target::Derivatives(vec![Pull::new(name, 1.0)]);
         let mut slot = Slot::new(Place::Loop, format!("state:{name}"), format!("in the loop of {name}"), target);
         // Where a law enters above the line it is measured by what stands there.
@@ -58,14 +58,18 @@ impl Finder<'_> {
     }
 }
 
-/// The first expression of that kind whose size a rate holds.
-fn size_of(rate: &Expr, wanted: impl Fn(&Expr) -> bool) -> Option<Expr> {
+/// The first velocity whose size the rate of a state holds, or whose sign beside that of the state: `abs(v)`, `abs(v*z)`, `sign(v*z)`.
+fn speed_of(rate: &Expr, state: &str, wanted: impl Fn(&Expr) -> bool) -> Option<Expr> {
     let mut found = None;
     rate.visit(&mut |e| {
-        if let Expr::Call(Function::Abs, a) = e
-            && found.is_none()
-        {
-            found = a.first().filter(|a| wanted(a)).cloned();
+        let held = match e {
+            Expr::Call(Function::Abs, a) => a.first(),
+            Expr::Call(Function::Sign, a) => a.first().filter(|a| a.uses(state)),
+            _ => None,
+        };
+        if let (Some(held), None) = (held, &found) {
+            let factors = Factors::of(held.clone()).above;
+            found = factors.into_iter().find(|f| !f.uses(state) && wanted(f));
         }
     });
     found
@@ -86,7 +90,11 @@ mod tests {
         };
         check("k*w2 - k*abs(w2)*z2", Some(["w2", "k*w2", "k*w2 - k*abs(w2)*z2"]));
         check("(w2 - abs(w2)*z2)/k", Some(["w2", "w2", "w2 - abs(w2)*z2"]));
+        let signed = "k*w2*(1 - 0.5*abs(z2)*(sign(w2*z2) + 1))";
+        check(signed, Some(["w2", "k*w2", signed]));
+        check("k*w2 - k*abs(w2*z2)", Some(["w2", "k*w2", "k*w2 - k*abs(w2*z2)"]));
         check("k*w2 - c*z2", None);
+        check("k*w2 - c*sign(w2)", None);
         check("k*w2 - c*abs(z2)*z2", None);
     }
 }
