@@ -8,6 +8,7 @@ use super::wanders::{Wanders, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
+use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::explore::Explored;
@@ -151,11 +152,17 @@ impl<'d> Judgement<'d> {
         !self.runs_away && self.within == VerdictKind::NoSignificantMismatch && self.kind == VerdictKind::Ambiguous
     }
 
-    /// The winner without the members in the place of which something wanders, as a place in the pool; the simulation as it is where the others were
-    /// not fitted or explain too little.
+    /// The winner without the members in the place of which something wanders, and without what else changes there in time, as a place in the pool; the
+    /// simulation as it is where the others were not fitted or explain too little.
     pub fn steady(&self, pool: &[Hypothesis<'_>]) -> usize {
         let best = &pool[self.winner];
-        let key = best.key_of(|i| self.wandering[i].as_ref().is_none_or(|w| w.probability <= LIKELY));
+        let wanders = |i: usize| self.wandering[i].as_ref().is_some_and(|w| w.probability > LIKELY);
+        let changes = |i: usize, at: &str| {
+            best.effects[i].mechanism.family == Family::TimeVariation && best.effects[i].slot.label == at
+        };
+        let all = 0..best.effects.len();
+        let key =
+            best.key_of(|i| !all.clone().any(|j| wanders(j) && (i == j || changes(i, &best.effects[j].slot.label))));
         let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence - pool[0].log_evidence)).collect();
         place_of(&sets, &key, STEADY * sets[self.winner].1)
     }

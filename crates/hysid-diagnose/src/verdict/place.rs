@@ -47,9 +47,9 @@ pub fn place_of_change(h: &Hypothesis<'_>, effect: &Effect) -> Option<String> {
     }
     best.map(|(level, name, after)| {
         let (side, when) = (if level.above { "above" } else { "below" }, if after { "after" } else { "before" });
+        let (level, moment) = (number(level.at), number(moment));
         format!(
-            "something that changes where `{name}` is {side} {}, where it is {when} that moment only",
-            number(level.at)
+            "something that changes where `{name}` is {side} {level} (the recording is there only {when} {moment} s)"
         )
     })
 }
