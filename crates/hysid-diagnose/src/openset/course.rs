@@ -1,8 +1,9 @@
-//! The courses over time by which a parameter may vary: those of a walk, or the two phases of an oscillation.
+//! The courses by which a parameter may vary: those of a walk over time, the two phases of an oscillation, a recorded input.
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 use crate::model::base::Base;
+use crate::text::number;
 
 /// Courses of a walk: the slowest that a Brownian motion is made of.
 pub const COURSES: usize = 16;
@@ -16,6 +17,62 @@ pub enum Course {
     Walk(f64),
     /// It oscillates at this frequency, in hertz.
     Line(f64),
+    /// It follows an input.
+    Follows(Followed),
+}
+
+/// An input that a parameter may follow: itself or its square, counted from its mean in multiples of its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Followed {
+    /// Its place among the inputs.
+    pub input: usize,
+    squared: bool,
+    mean: f64,
+    deviation: f64,
+}
+
+impl Followed {
+    /// All that a parameter of a fitted simulation may follow.
+    pub fn all(base: &Base<'_>) -> Vec<Self> {
+        let stretches = &base.model.data().stretches;
+        let inputs = base.model.simulation().inputs.len();
+        let of = |(input, squared): (usize, bool)| {
+            let raw = Self { input, squared, mean: 0.0, deviation: 1.0 };
+            let all: Vec<f64> = stretches.iter().flat_map(|s| raw.series(&s.drive.inputs()[input])).collect();
+            let count = all.len().max(1) as f64;
+            let mean = all.iter().sum::<f64>() / count;
+            let deviation = (all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
+            (deviation > 1e-9 * mean.abs() && deviation.is_finite()).then_some(Self { mean, deviation, ..raw })
+        };
+        (0..inputs).flat_map(|i| [(i, false), (i, true)]).filter_map(of).collect()
+    }
+
+    fn series(&self, u: &[f64]) -> Vec<f64> {
+        u.iter().map(|u| (if self.squared { u * u } else { *u } - self.mean) / self.deviation).collect()
+    }
+
+    /// The course of a parameter that follows it, by stretch.
+    pub fn course(&self, base: &Base<'_>) -> Series {
+        base.model.data().stretches.iter().map(|s| self.series(&s.drive.inputs()[self.input])).collect()
+    }
+
+    /// The same as it is written over the input's symbol.
+    pub fn text(&self, symbol: &str) -> String {
+        let Self { mean, deviation, .. } = self;
+        if self.squared {
+            format!("({symbol}^2 - {mean})/{deviation}")
+        } else {
+            format!("({symbol} - {mean})/{deviation}")
+        }
+    }
+
+    /// What it does to a parameter with this amplitude, in words.
+    pub fn words(&self, symbol: &str, amplitude: f64) -> String {
+        let rises = if amplitude < 0.0 { "falls" } else { "rises" };
+        let of = if self.squared { "the square of " } else { "" };
+        let share = number(100.0 * (amplitude / self.deviation).abs());
+        format!("{rises} with {of}the input `{symbol}`, by {share} % of its value for each unit of it")
+    }
 }
 
 impl Course {
@@ -23,7 +80,7 @@ impl Course {
     pub fn precision(self, share: f64) -> f64 {
         match self {
             Self::Walk(scale) => 1.0 / (scale * scale * share),
-            Self::Line(_) => 0.0,
+            Self::Line(_) | Self::Follows(_) => 0.0,
         }
     }
 }
@@ -66,7 +123,8 @@ impl Time {
         self.at.iter().map(|s| s.iter().map(|t| f(*t)).collect()).collect()
     }
 
-    /// The courses of a walk, each for one standard deviation of a walk that ends one away, or the two phases of an oscillation.
+    /// The courses of a walk, each for one standard deviation of a walk that ends one away, or the two phases of an oscillation; none over time of what
+    /// follows an input.
     pub fn courses(&self, course: Course) -> Vec<Series> {
         match course {
             Course::Walk(_) => (0..COURSES)
@@ -76,6 +134,7 @@ impl Time {
                 })
                 .collect(),
             Course::Line(f) => vec![self.over(|t| (TAU * f * t).sin()), self.over(|t| (TAU * f * t).cos())],
+            Course::Follows(_) => Vec::new(),
         }
     }
 
@@ -89,6 +148,7 @@ impl Time {
                 })
                 .collect(),
             Course::Line(f) => phases(&format!("{:.8}", TAU * f)).to_vec(),
+            Course::Follows(_) => Vec::new(),
         }
     }
 

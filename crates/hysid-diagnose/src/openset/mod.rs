@@ -37,7 +37,7 @@ use signature::signature;
 use terms::{Term, terms};
 use varying::{Varying, varying};
 use view::View;
-use written::{Sparse, with_oscillation};
+use written::{Sparse, with_course};
 
 /// A correction with what decides whether it is believed.
 #[derive(Debug, Clone)]
@@ -88,8 +88,8 @@ impl OpenSet {
 pub enum Writable {
     /// Generic terms.
     Sparse(Sparse),
-    /// The simulation with a parameter that oscillates.
-    Oscillation(Simulation),
+    /// The simulation with a parameter that oscillates or follows an input.
+    Varying(Simulation),
 }
 
 /// Most terms of a correction.
@@ -198,14 +198,15 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         })
         .collect();
     let place = if found.input { "input" } else { "parameter" };
+    let side = if found.followed.is_some() { "plant" } else { "time" };
     let signature =
-        SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "odd".into(), side: "time".into() };
+        SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "odd".into(), side: side.into() };
     OpenSet {
         record: CorrectionRecord { slot: format!("{place}:{}", found.symbol), terms: records, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),
         gain: found.gain,
         choice: 0.0,
-        writable: with_oscillation(&base.document(), &found).map(Writable::Oscillation),
+        writable: with_course(&base.document(), &found).map(Writable::Varying),
         words: Some(found.words()),
     }
 }

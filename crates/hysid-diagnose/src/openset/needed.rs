@@ -38,7 +38,7 @@ struct Fit<'d> {
 /// The correction fitted in the place of, or on top of, a set, without the terms that it does not need.
 pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable) -> Option<Refitted<'d>> {
     let sparse = match writable {
-        Writable::Oscillation(simulation) => {
+        Writable::Varying(simulation) => {
             let hypothesis = fit(setting, parent, &parent.base.values(), simulation)?;
             return Some(Refitted { hypothesis, terms: Vec::new(), slot: None });
         }

@@ -1,15 +1,15 @@
-//! Parameters that are not constant: a parameter or an input gain that wanders, or that oscillates at a frequency of its own.
+//! Parameters that are not constant: a parameter or an input gain that wanders, that oscillates at a frequency of its own, or that follows a recorded input.
 //!
 //! No feature of the catalogue need resemble what such a parameter does, and a noise model that was fitted to the residual takes it for noise. So each
 //! modulation is judged by its evidence with a noise model of its own, under the noise of the fit and, where that is coloured, from white
 //! noise. A walk pays for what the recording settles of it ([`Wander`]); an oscillation pays for two amplitudes, and for the lines and parameters among
-//! which it was found.
+//! which it was found; what follows an input for one, and for the inputs and parameters.
 
 use std::f64::consts::SQRT_2;
 
 use rand_distr::{Distribution, StandardNormal};
 
-use super::course::{COURSES, Course, Series, Time};
+use super::course::{COURSES, Course, Followed, Series, Time};
 use super::modulation::{Modulated, modulated};
 use super::regress::regress;
 use super::view::View;
@@ -25,8 +25,9 @@ const LINES: (usize, usize) = (4, 2);
 /// Scores of noise against which those of the residual are held, and the stream that it is drawn from.
 const NOISES: usize = 7;
 const STREAM: u64 = 0x7 << 56;
-/// Walks that are judged with a noise model of their own.
+/// Walks, and parameters that follow an input, that are judged with a noise model of their own.
 const WALKS: usize = 2;
+const FOLLOWING: usize = 2;
 /// Rounds of amplitudes and noise by turns.
 const ROUNDS: usize = 3;
 
@@ -36,6 +37,8 @@ pub struct Varying {
     pub symbol: String,
     /// Whether it is an input.
     pub input: bool,
+    /// The symbol of the input that it follows.
+    pub followed: Option<String>,
     /// How it varies.
     pub course: Course,
     /// The courses over time, as factors of the parameter's own value, for an amplitude of one.
@@ -63,6 +66,10 @@ impl Varying {
     pub fn words(&self) -> String {
         let what = if self.input { "the gain of the input" } else { "the parameter" };
         let how = match self.course {
+            Course::Follows(followed) => {
+                let symbol = self.followed.as_deref().unwrap_or_default();
+                followed.words(symbol, self.amplitudes.first().copied().unwrap_or(0.0))
+            }
             Course::Walk(_) => {
                 format!("wanders slowly in time, by {} % of its value (rms)", number(100.0 * self.size))
             }
@@ -99,14 +106,27 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<
         (0..symbols.len()).flat_map(|i| courses.iter().map(move |w| (i, w.clone()))).collect();
     let of_walks: Vec<Option<Vec<Vec<f64>>>> =
         machine.responses(&requests).chunks(COURSES).map(|some| some.iter().cloned().collect()).collect();
+    let inputs = base.model.simulation().inputs.as_slice();
+    let pairs: Vec<(usize, Followed)> = Followed::all(base)
+        .into_iter()
+        .flat_map(|f| (0..symbols.len()).map(move |i| (i, f)))
+        .filter(|(i, f)| symbols[*i] != inputs[f.input].symbol)
+        .collect();
+    let requests: Vec<(usize, Series)> = pairs.iter().map(|(i, f)| (*i, f.course(base))).collect();
+    let following: Vec<(usize, Followed, Vec<f64>)> = (pairs.into_iter().zip(machine.responses(&requests)))
+        .filter_map(|((symbol, f), column)| Some((symbol, f, column?)))
+        .collect();
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
     let mut best: Option<Varying> = None;
     for noise in noises {
         let view = View::new(base, noise);
         let mut found = likely_walks(&view, kind, &of_walks);
         found.extend(likely_lines(base, &view, &machine, &time, symbols.len()));
+        found.extend(likely_to_follow(&view, &following));
         for candidate in found {
-            let Some(v) = judged(base, kind, noise, &symbols, &time, candidate, none) else { continue };
+            let Some(v) = judged(base, kind, noise, (&symbols, following.len()), &time, candidate, none) else {
+                continue;
+            };
             if best.as_ref().is_none_or(|b| v.gain > b.gain) {
                 best = Some(v);
             }
@@ -127,6 +147,18 @@ fn likely_walks(view: &View<'_>, kind: NoiseKind, of_walks: &[Option<Vec<Vec<f64
     let mut found: Vec<Candidate> = of_walks.iter().enumerate().filter_map(one).collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     found.truncate(WALKS);
+    found
+}
+
+/// The parameters that explain most under this noise where they follow an input, with the response to that.
+fn likely_to_follow(view: &View<'_>, following: &[(usize, Followed, Vec<f64>)]) -> Vec<Candidate> {
+    let one = |(symbol, followed, column): &(usize, Followed, Vec<f64>)| {
+        let columns = vec![column.clone()];
+        Candidate { symbol: *symbol, course: Course::Follows(*followed), gain: view.free_gain(&columns), columns }
+    };
+    let mut found: Vec<Candidate> = following.iter().map(one).collect();
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found.truncate(FOLLOWING);
     found
 }
 
@@ -165,12 +197,12 @@ fn likely_lines(
     found
 }
 
-/// A candidate with a noise model of its own, beside the log likelihood of `none`.
+/// A candidate with a noise model of its own, beside the log likelihood of `none`. It is one of so many symbols, and pairs of a symbol and what it follows.
 fn judged(
     base: &Base<'_>,
     kind: NoiseKind,
     noise: &Whitener,
-    symbols: &[String],
+    (symbols, pairs): (&[String], usize),
     time: &Time,
     candidate: Candidate,
     none: f64,
@@ -199,29 +231,42 @@ fn judged(
     let view = View::new(base, &left);
     let white = view.of(&columns);
     let among = (symbols.len() as f64).ln();
+    let free = |lasting: usize| {
+        let price = kind.price(base.model.count().lasting, Count { lasting, passing: 0 }, data.rows());
+        (share * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)), price)
+    };
     let (likelihood, price) = match course {
         Course::Walk(_) => {
             (share * view.log_likelihood(base) + Wander::new(&white, &view.r, share).mean_gain().0, among + SLOW)
         }
         Course::Line(_) => {
-            let both = kind.price(base.model.count().lasting, Count { lasting: 2, passing: 0 }, data.rows());
-            let lines = time.samples().max(2) as f64;
-            (
-                share * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)),
-                both + lines.ln() + among,
-            )
+            let (likelihood, price) = free(2);
+            (likelihood, price + (time.samples().max(2) as f64).ln() + among)
+        }
+        Course::Follows(_) => {
+            let (likelihood, price) = free(1);
+            (likelihood, price + (pairs.max(1) as f64).ln())
         }
     };
     let total = norm2(&view.r).max(f64::MIN_POSITIVE);
     let err = white.iter().zip(&amplitudes).map(|(c, a)| a * dot(c, &view.r) / total).collect();
     let symbol = symbols.get(symbol)?.clone();
-    let input = base.model.simulation().inputs.iter().any(|u| u.symbol == symbol);
+    let inputs = &base.model.simulation().inputs;
+    let input = inputs.iter().any(|u| u.symbol == symbol);
+    let (texts, size, followed) = match course {
+        Course::Follows(f) => {
+            let followed = &inputs[f.input].symbol;
+            (vec![f.text(followed)], amplitudes.first().map_or(0.0, |a| a.abs()), Some(followed.clone()))
+        }
+        _ => (time.texts(course), time.deviation(course, &amplitudes), None),
+    };
     Some(Varying {
         symbol,
         input,
+        followed,
         course,
-        texts: time.texts(course),
-        size: time.deviation(course, &amplitudes),
+        texts,
+        size,
         columns,
         amplitudes,
         precision: course.precision(share),
@@ -244,7 +289,7 @@ pub(crate) mod tests {
     use crate::data::DataSet;
     use crate::model::base::{Start, fit_simulation};
     use crate::model::{Model, Values};
-    use crate::openset::written::with_oscillation;
+    use crate::openset::written::with_course;
     pub use crate::oscillator::BASELINE;
     use crate::oscillator::{PERIOD, REAL, drive, normal, respond, rms};
     use crate::refit::LmOptions;
@@ -293,6 +338,34 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_coefficient_that_follows_another_input_is_found_with_its_slope() {
+        let text = "[time]\nperiod_s = 0.1\n[inputs]\nv = \"v_m_s\"\ni = \"coil_A\"\n[parameters]\nf = { value = 1.0, min = 0.1, max = 9.0 }\nc = { value = 1.0, min = 0.1, max = 9.0 }\n\
+                    [outputs]\ny_N = \"f*tanh(5*v) + c*v + 0*i\"\n";
+        let simulation = Simulation::parse(text, "static.sim.toml").unwrap();
+        let mut random = normal(5);
+        let v: Vec<f64> = (0..900).map(|_| random()).collect();
+        let i: Vec<f64> = (0..900).map(|k| 2.0 + (0.05 * f64::from(k)).sin()).collect();
+        let force = |(v, i): (&f64, &f64)| 3.0 * (1.0 + 0.05 * (i - 2.0)) * (5.0 * v).tanh() + 2.0 * v;
+        let y = v.iter().zip(&i).map(|at| force(at) + 0.1 * random()).collect();
+        let data = crate::model::hypothesis::recorded(&simulation, 0.1, [("v_m_s", v), ("coil_A", i), ("y_N", y)]);
+        let fit = |simulation: &Simulation| {
+            let (start, options) = (Values::default(), LmOptions { iterations: 25, ..LmOptions::default() });
+            let model = model(simulation, &data);
+            fit_simulation(model, Start::Values(&start), &[], None, 2, options, NoiseKind::Coloured).unwrap()
+        };
+        let base = fit(&simulation);
+        let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
+        assert_eq!((found.symbol.as_str(), found.followed.as_deref()), ("f", Some("i")), "{}", found.words());
+        assert!(found.gain > 20.0, "{}", found.gain);
+        let slope: f64 = found.amplitudes[0] / 0.5_f64.sqrt();
+        assert!((slope - 0.05).abs() < 0.01, "{slope}");
+        assert!(found.words().starts_with("the parameter `f` rises with the input `i`, by "), "{}", found.words());
+        // As it is written it answers as the truth does.
+        let written = with_course(&base.document(), &found).unwrap();
+        assert!(rms(&fit(&written).fit.residual) < 1.05 * 0.1, "{}", written.to_toml());
+    }
+
+    #[test]
     fn a_stiffness_that_wanders_is_found() {
         let v = found(&recorded(4, |t| 1.0 + 0.02 * ((0.31 * t).sin() + (0.17 * t).cos() * (0.53 * t).sin()), 0.02));
         assert!(v.symbol == "k" && matches!(v.course, Course::Walk(_)) && v.gain > 30.0, "{} {}", v.words(), v.gain);
@@ -333,7 +406,7 @@ pub(crate) mod tests {
         let data = recorded(3, |t| 1.0 + 0.02 * (TAU * 0.73 * t).sin(), 0.02);
         let v = found(&data);
         let base = fitted(&data);
-        let written = with_oscillation(&base.document(), &v).unwrap();
+        let written = with_course(&base.document(), &v).unwrap();
         let names: Vec<String> =
             written.parameters.iter().map(|p| p.name.clone()).filter(|n| n.starts_with('g')).collect();
         assert_eq!(names.len(), 2);

@@ -169,15 +169,22 @@ fn held<'t>(terms: &[(&'t Term, f64)]) -> Option<Vec<&'t Expr>> {
 /// Share of a cycle over the recording by which a frequency may move from where the periodogram found it.
 const CYCLES: f64 = 0.75;
 
-/// A simulation in which a parameter oscillates, amplitudes and frequency unknown; `None` for a walk, since another recording sees another one.
-pub fn with_oscillation(simulation: &Simulation, found: &Varying) -> Option<Simulation> {
-    let Course::Line(f) = found.course else { return None };
+/// A simulation in which a parameter oscillates, amplitudes and frequency unknown, or follows an input; `None` for a walk, since another recording sees
+/// another one.
+pub fn with_course(simulation: &Simulation, found: &Varying) -> Option<Simulation> {
     let mut written = simulation.clone();
-    let frequency = written.fresh_symbol("s");
-    let (w, far) = (TAU * f, TAU * CYCLES / found.length_s);
-    written.parameters.push(Parameter::new(&frequency, w).within(w - far, w + far));
+    let texts = match found.course {
+        Course::Walk(_) => return None,
+        Course::Line(f) => {
+            let frequency = written.fresh_symbol("s");
+            let (w, far) = (TAU * f, TAU * CYCLES / found.length_s);
+            written.parameters.push(Parameter::new(&frequency, w).within(w - far, w + far));
+            phases(&frequency).to_vec()
+        }
+        Course::Follows(_) => found.texts.clone(),
+    };
     let mut factor = Expr::Number(1.0);
-    for (text, amplitude) in phases(&frequency).iter().zip(&found.amplitudes) {
+    for (text, amplitude) in texts.iter().zip(&found.amplitudes) {
         let course = Expr::parse(text).ok()?;
         let name = written.fresh_symbol("g");
         let reach = REACH * found.size;
