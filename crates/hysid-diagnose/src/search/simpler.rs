@@ -45,7 +45,7 @@ pub fn simplify<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, pool: &mut Vec
 fn special<'h>(h: &'h Hypothesis<'_>) -> impl Iterator<Item = (usize, &'static Mechanism)> + 'h {
     h.effects.iter().enumerate().flat_map(|(i, e)| {
         let there = e.mechanism.contains.iter().filter_map(|id| mechanism(id));
-        there.filter(|m| (m.applies)(&e.slot) && !m.is_in(&e.slot)).map(move |m| (i, m))
+        there.filter(|m| m.fits(&e.slot) && !m.is_in(&e.slot)).map(move |m| (i, m))
     })
 }
 
@@ -72,4 +72,47 @@ fn simpler<'d>(
     };
     let h = assemble(setting, none, &values, &parts, &set.base.whitener, SKETCH)?;
     Some(if h.log_evidence > set.log_evidence - HOPELESS { complete(setting, h) } else { h })
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use crate::search::fitting::refit;
+    use crate::search::screen::screen;
+
+    /// Friction alike in both directions beside a hardening spring, found as unequal friction: the special case takes its place, and one that is there already
+    /// is not fitted again.
+    #[test]
+    fn unequal_friction_that_is_equal_gives_way() {
+        let mut random = normal(3);
+        let u = drive(900, &mut random);
+        let mut y = respond(&u, REAL, |x, v| 0.3 * v.signum() + 900.0 * x * x * x);
+        let noise = 0.01 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * random());
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let with = |parent: &Hypothesis<'_>, id: &str| {
+            let evidence = parent.base.evidence();
+            let found = screen(&parent.base, &setting.original, &parent.effects, &evidence, &|m, _| m.id == id);
+            refit(&setting, parent, &found[0]).unwrap()
+        };
+        let wider = with(&with(&none, "asymmetric_friction"), "cubic_stiffness");
+        let (key, evidence) = (wider.key(), wider.log_evidence);
+        let mut pool = vec![wider];
+        simplify(&setting, &none, &mut pool);
+        assert_eq!(pool.len(), 2);
+        let ids: Vec<&str> = pool[1].key().iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, ["coulomb_friction", "cubic_stiffness"]);
+        assert!(pool[1].log_evidence > evidence, "{} {evidence}", pool[1].log_evidence);
+        simplify(&setting, &none, &mut pool);
+        assert!(pool.len() == 2 && pool[0].key() == key);
+    }
 }
