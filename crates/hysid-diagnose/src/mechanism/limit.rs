@@ -34,9 +34,10 @@ pub(super) fn limited(signal: &'static str, quantiles: &[f64], purpose: Purpose)
                 "2*s_o - s_n",
             )
         }
-        // What gives way by and by, an amplifier or a core (Froelich's curve): the recording need not come near the limit.
-        Purpose::Form(Form::Soft) => by_and_by(format!("s_t*tanh({signal}/s_t)")),
-        Purpose::Form(Form::Softer) => by_and_by(format!("{signal}/(1 + abs({signal})/s_t)")),
+        // What gives way by and by, an amplifier or a core (Froelich's curve): the recording need not come near the limit. Of a force that is measured under a
+        // prescribed motion it would imitate whatever softens (a rocking wall, a damper).
+        Purpose::Form(Form::Soft) if signal == "u" => by_and_by(format!("s_t*tanh({signal}/s_t)")),
+        Purpose::Form(Form::Softer) if signal == "u" => by_and_by(format!("{signal}/(1 + abs({signal})/s_t)")),
         Purpose::Refit | Purpose::Form(_) => {
             at(format!("max(min({signal}, s), -s)"), Grid::Quantiles(signal, quantiles.to_vec()))
         }

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 use crate::model::base::Base;
+use crate::slot::{Place, Structure};
 use crate::text::number;
 
 /// Courses of a walk: the slowest that a Brownian motion is made of.
@@ -32,10 +33,20 @@ pub struct Followed {
 }
 
 impl Followed {
-    /// All that a parameter of a fitted simulation may follow.
+    /// All that a parameter of a fitted simulation may follow: what is recorded besides the one input that drives it, and besides a prescribed motion. A
+    /// parameter that follows those is a curved law, which has terms of its own.
     pub fn all(base: &Base<'_>) -> Vec<Self> {
         let stretches = &base.model.data().stretches;
-        let inputs = base.model.simulation().inputs.len();
+        let simulation = base.model.simulation();
+        let structure = Structure::of(simulation);
+        let laws = structure.slots.iter().filter(|s| s.place == Place::ForceLaw);
+        let motion: Vec<String> = laws
+            .flat_map(|s| ["x", "v"].map(|n| s.quantity(n)))
+            .flatten()
+            .flat_map(|q| q.expression.symbols())
+            .collect();
+        let several = simulation.inputs.len() > 1;
+        let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| several && !motion.contains(&u.symbol));
         let of = |(input, squared): (usize, bool)| {
             let raw = Self { input, squared, mean: 0.0, deviation: 1.0 };
             let all: Vec<f64> = stretches.iter().flat_map(|s| raw.series(&s.drive.inputs()[input])).collect();
@@ -44,7 +55,7 @@ impl Followed {
             let deviation = (all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
             (deviation > 1e-9 * mean.abs() && deviation.is_finite()).then_some(Self { mean, deviation, ..raw })
         };
-        (0..inputs).flat_map(|i| [(i, false), (i, true)]).filter_map(of).collect()
+        inputs.flat_map(|(i, _)| [(i, false), (i, true)]).filter_map(of).collect()
     }
 
     fn series(&self, u: &[f64]) -> Vec<f64> {

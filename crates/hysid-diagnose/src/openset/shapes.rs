@@ -131,7 +131,9 @@ pub fn curves(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<Shape> {
                 *w = w.max(v - r).min(v + r);
                 *w
             };
-            Shape::new(format!("play({name}, {})", free(r)), Kind::Play, in_turn(x, |_| 0.0, play))
+            // Chosen as if each began in the middle of its band: where a recording begins far from zero, plays that all begin at one edge are so many steps at
+            // its first samples, and follow whatever happens there. What is written begins as the operator does, and is refitted.
+            Shape::new(format!("play({name}, {})", free(r)), Kind::Play, in_turn(x, |first| first, play))
         }));
     }
     out
