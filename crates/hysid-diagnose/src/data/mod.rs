@@ -55,6 +55,11 @@ impl Stretch {
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
+
+    /// Times of the samples, in seconds.
+    pub fn times(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.len()).map(|n| self.start_s + n as f64 * self.drive.period_s())
+    }
 }
 
 /// All estimation (or all hold-out) data.

@@ -137,7 +137,7 @@ impl Need {
                 })
             }
             Self::Angle(least) => {
-                // What turns, turns far enough.
+                // Over an angle that was added there is no `x`: what turns, turns far enough.
                 let x = series("x")?;
                 let radians = signals.constants.get("rad").copied().unwrap_or(1.0);
                 let largest = x.iter().fold(0.0_f64, |m, v| m.max(v.abs())) * radians;

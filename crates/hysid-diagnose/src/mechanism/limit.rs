@@ -9,10 +9,6 @@ pub(super) fn limited(signal: &'static str, quantiles: &[f64], purpose: Purpose)
     let above = || Grid::SignedQuantiles(signal, quantiles.to_vec());
     let at = |text: String, level: Grid| Law::replace(text).shape("s", signal, level).searched();
     let about = |law: Law| law.constant("s_o", signal, Grid::SignedQuantiles(signal, vec![0.5])).silent();
-    let by_and_by = |text: String| {
-        let reach = Grid::Reach(signal, vec![0.7, 1.5, 3.0, 6.0]);
-        Law::replace(text).shape("s_t", signal, reach).silent().report("s", signal, "s_t")
-    };
     match purpose {
         Purpose::Screening => about(
             each_side(signal, &format!("{signal} - (2*s_o - s)"))
@@ -34,10 +30,6 @@ pub(super) fn limited(signal: &'static str, quantiles: &[f64], purpose: Purpose)
                 "2*s_o - s_n",
             )
         }
-        // What gives way by and by, an amplifier or a core (Froelich's curve): the recording need not come near the limit. Of a force that is measured under a
-        // prescribed motion it would imitate whatever softens (a rocking wall, a damper).
-        Purpose::Form(Form::Soft) if signal == "u" => by_and_by(format!("s_t*tanh({signal}/s_t)")),
-        Purpose::Form(Form::Softer) if signal == "u" => by_and_by(format!("{signal}/(1 + abs({signal})/s_t)")),
         Purpose::Refit | Purpose::Form(_) => {
             at(format!("max(min({signal}, s), -s)"), Grid::Quantiles(signal, quantiles.to_vec()))
         }

@@ -10,6 +10,7 @@
 //! MSSP 75 (2016): memory without rate needs an operator with memory, which no static term imitates.
 
 mod course;
+mod followed;
 mod modulation;
 pub mod needed;
 mod regress;
@@ -31,6 +32,7 @@ use crate::evidence::{Whitener, norm2};
 use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
+use course::Course;
 use regress::regress;
 use shapes::Kind;
 use signature::signature;
@@ -198,7 +200,7 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         })
         .collect();
     let place = if found.input { "input" } else { "parameter" };
-    let side = if found.followed.is_some() { "plant" } else { "time" };
+    let side = if matches!(found.course, Course::Follows(_)) { "plant" } else { "time" };
     let signature =
         SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "odd".into(), side: side.into() };
     OpenSet {

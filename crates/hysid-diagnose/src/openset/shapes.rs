@@ -186,12 +186,7 @@ pub fn lags(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
 /// A coordinate with a coefficient that drifts, and one that changes during a part of the recording.
 pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
     let over = |f: &dyn Fn(f64) -> f64| -> Series {
-        x.iter()
-            .zip(&data.stretches)
-            .map(|(s, st)| {
-                s.iter().enumerate().map(|(n, v)| v * f(st.start_s + n as f64 * st.drive.period_s())).collect()
-            })
-            .collect()
+        x.iter().zip(&data.stretches).map(|(s, st)| s.iter().zip(st.times()).map(|(v, t)| v * f(t)).collect()).collect()
     };
     let mut out = vec![Shape::new(format!("t*{name}"), Kind::Time, over(&|t| t))];
     let ends = data.stretches.iter().map(|s| (s.start_s, s.start_s + s.len() as f64 * s.drive.period_s()));

@@ -9,7 +9,8 @@ use std::f64::consts::SQRT_2;
 
 use rand_distr::{Distribution, StandardNormal};
 
-use super::course::{COURSES, Course, Followed, Series, Time};
+use super::course::{COURSES, Course, Series, Time};
+use super::followed::Followed;
 use super::modulation::{Modulated, modulated};
 use super::regress::regress;
 use super::view::View;
@@ -37,8 +38,6 @@ pub struct Varying {
     pub symbol: String,
     /// Whether it is an input.
     pub input: bool,
-    /// The symbol of the input that it follows.
-    pub followed: Option<String>,
     /// How it varies.
     pub course: Course,
     /// The courses over time, as factors of the parameter's own value, for an amplitude of one.
@@ -65,17 +64,14 @@ impl Varying {
     /// In words.
     pub fn words(&self) -> String {
         let what = if self.input { "the gain of the input" } else { "the parameter" };
-        let how = match self.course {
-            Course::Follows(followed) => {
-                let symbol = self.followed.as_deref().unwrap_or_default();
-                followed.words(symbol, self.amplitudes.first().copied().unwrap_or(0.0))
-            }
+        let how = match &self.course {
+            Course::Follows(input) => input.words(self.amplitudes.first().copied().unwrap_or(0.0)),
             Course::Walk(_) => {
                 format!("wanders slowly in time, by {} % of its value (rms)", number(100.0 * self.size))
             }
             Course::Line(f) => format!(
                 "oscillates in time at {} Hz, by {} % of its value",
-                number(f),
+                number(*f),
                 number(100.0 * SQRT_2 * self.size)
             ),
         };
@@ -101,21 +97,13 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<
     if symbols.is_empty() {
         return None;
     }
-    let courses = time.courses(Course::Walk(1.0));
+    let courses = time.courses(&Course::Walk(1.0));
     let requests: Vec<(usize, Series)> =
         (0..symbols.len()).flat_map(|i| courses.iter().map(move |w| (i, w.clone()))).collect();
     let of_walks: Vec<Option<Vec<Vec<f64>>>> =
         machine.responses(&requests).chunks(COURSES).map(|some| some.iter().cloned().collect()).collect();
-    let inputs = base.model.simulation().inputs.as_slice();
-    let pairs: Vec<(usize, Followed)> = Followed::all(base)
-        .into_iter()
-        .flat_map(|f| (0..symbols.len()).map(move |i| (i, f)))
-        .filter(|(i, f)| symbols[*i] != inputs[f.input].symbol)
-        .collect();
-    let requests: Vec<(usize, Series)> = pairs.iter().map(|(i, f)| (*i, f.course(base))).collect();
-    let following: Vec<(usize, Followed, Vec<f64>)> = (pairs.into_iter().zip(machine.responses(&requests)))
-        .filter_map(|((symbol, f), column)| Some((symbol, f, column?)))
-        .collect();
+    let inputs = Followed::all(base);
+    let following = following(&machine, &symbols, &inputs);
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
     let mut best: Option<Varying> = None;
     for noise in noises {
@@ -150,11 +138,23 @@ fn likely_walks(view: &View<'_>, kind: NoiseKind, of_walks: &[Option<Vec<Vec<f64
     found
 }
 
-/// The parameters that explain most under this noise where they follow an input, with the response to that.
-fn likely_to_follow(view: &View<'_>, following: &[(usize, Followed, Vec<f64>)]) -> Vec<Candidate> {
-    let one = |(symbol, followed, column): &(usize, Followed, Vec<f64>)| {
+/// A parameter that follows an input, with the response to that.
+type Following<'a> = (usize, &'a Followed, Vec<f64>);
+
+/// Every symbol with every input that it may follow.
+fn following<'a>(machine: &Modulated<'_>, symbols: &[String], inputs: &'a [Followed]) -> Vec<Following<'a>> {
+    let pairs = inputs.iter().flat_map(|u| (0..symbols.len()).map(move |i| (i, u)));
+    let pairs: Vec<(usize, &Followed)> = pairs.filter(|(i, u)| symbols[*i] != u.symbol).collect();
+    let requests: Vec<(usize, Series)> = pairs.iter().map(|(i, u)| (*i, u.series.clone())).collect();
+    pairs.into_iter().zip(machine.responses(&requests)).filter_map(|((i, u), column)| Some((i, u, column?))).collect()
+}
+
+/// The parameters that explain most under this noise where they follow an input.
+fn likely_to_follow(view: &View<'_>, following: &[Following<'_>]) -> Vec<Candidate> {
+    let one = |(symbol, input, column): &Following<'_>| {
         let columns = vec![column.clone()];
-        Candidate { symbol: *symbol, course: Course::Follows(*followed), gain: view.free_gain(&columns), columns }
+        let course = Course::Follows((*input).clone());
+        Candidate { symbol: *symbol, course, gain: view.free_gain(&columns), columns }
     };
     let mut found: Vec<Candidate> = following.iter().map(one).collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -182,13 +182,14 @@ fn likely_lines(
         wanted.extend(lines(score, noises, LINES.0).iter().map(|l| (symbol, Course::Line(l.cycles / period_s))));
     }
     let requests: Vec<(usize, Series)> =
-        wanted.iter().flat_map(|&(symbol, line)| time.courses(line).into_iter().map(move |c| (symbol, c))).collect();
+        wanted.iter().flat_map(|(symbol, line)| time.courses(line).into_iter().map(move |c| (*symbol, c))).collect();
     let responses = machine.responses(&requests);
     let mut found: Vec<Candidate> = wanted
         .iter()
         .zip(responses.chunks(2))
-        .filter_map(|(&(symbol, course), pair)| {
+        .filter_map(|((symbol, course), pair)| {
             let columns: Vec<Vec<f64>> = pair.iter().cloned().collect::<Option<_>>()?;
+            let (symbol, course) = (*symbol, course.clone());
             Some(Candidate { symbol, course, gain: view.free_gain(&columns), columns })
         })
         .collect();
@@ -251,25 +252,16 @@ fn judged(
     let total = norm2(&view.r).max(f64::MIN_POSITIVE);
     let err = white.iter().zip(&amplitudes).map(|(c, a)| a * dot(c, &view.r) / total).collect();
     let symbol = symbols.get(symbol)?.clone();
-    let inputs = &base.model.simulation().inputs;
-    let input = inputs.iter().any(|u| u.symbol == symbol);
-    let (texts, size, followed) = match course {
-        Course::Follows(f) => {
-            let followed = &inputs[f.input].symbol;
-            (vec![f.text(followed)], amplitudes.first().map_or(0.0, |a| a.abs()), Some(followed.clone()))
-        }
-        _ => (time.texts(course), time.deviation(course, &amplitudes), None),
-    };
+    let input = base.model.simulation().inputs.iter().any(|u| u.symbol == symbol);
     Some(Varying {
         symbol,
         input,
-        followed,
+        texts: time.texts(&course),
+        size: time.deviation(&course, &amplitudes),
+        precision: course.precision(share),
         course,
-        texts,
-        size,
         columns,
         amplitudes,
-        precision: course.precision(share),
         err,
         length_s: time.length,
         gain: likelihood - none - price,
@@ -335,34 +327,6 @@ pub(crate) mod tests {
         let Course::Line(f) = v.course else { panic!("{}", v.words()) };
         assert!(v.symbol == "k" && (f - 0.73).abs() < 0.01 && v.gain > 30.0, "{} {}", v.words(), v.gain);
         assert!((SQRT_2 * v.size - 0.02).abs() < 0.005, "{}", v.words());
-    }
-
-    #[test]
-    fn a_coefficient_that_follows_another_input_is_found_with_its_slope() {
-        let text = "[time]\nperiod_s = 0.1\n[inputs]\nv = \"v_m_s\"\ni = \"coil_A\"\n[parameters]\nf = { value = 1.0, min = 0.1, max = 9.0 }\nc = { value = 1.0, min = 0.1, max = 9.0 }\n\
-                    [outputs]\ny_N = \"f*tanh(5*v) + c*v + 0*i\"\n";
-        let simulation = Simulation::parse(text, "static.sim.toml").unwrap();
-        let mut random = normal(5);
-        let v: Vec<f64> = (0..900).map(|_| random()).collect();
-        let i: Vec<f64> = (0..900).map(|k| 2.0 + (0.05 * f64::from(k)).sin()).collect();
-        let force = |(v, i): (&f64, &f64)| 3.0 * (1.0 + 0.05 * (i - 2.0)) * (5.0 * v).tanh() + 2.0 * v;
-        let y = v.iter().zip(&i).map(|at| force(at) + 0.1 * random()).collect();
-        let data = crate::model::hypothesis::recorded(&simulation, 0.1, [("v_m_s", v), ("coil_A", i), ("y_N", y)]);
-        let fit = |simulation: &Simulation| {
-            let (start, options) = (Values::default(), LmOptions { iterations: 25, ..LmOptions::default() });
-            let model = model(simulation, &data);
-            fit_simulation(model, Start::Values(&start), &[], None, 2, options, NoiseKind::Coloured).unwrap()
-        };
-        let base = fit(&simulation);
-        let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
-        assert_eq!((found.symbol.as_str(), found.followed.as_deref()), ("f", Some("i")), "{}", found.words());
-        assert!(found.gain > 20.0, "{}", found.gain);
-        let slope: f64 = found.amplitudes[0] / 0.5_f64.sqrt();
-        assert!((slope - 0.05).abs() < 0.01, "{slope}");
-        assert!(found.words().starts_with("the parameter `f` rises with the input `i`, by "), "{}", found.words());
-        // As it is written it answers as the truth does.
-        let written = with_course(&base.document(), &found).unwrap();
-        assert!(rms(&fit(&written).fit.residual) < 1.05 * 0.1, "{}", written.to_toml());
     }
 
     #[test]

@@ -173,7 +173,7 @@ const CYCLES: f64 = 0.75;
 /// another one.
 pub fn with_course(simulation: &Simulation, found: &Varying) -> Option<Simulation> {
     let mut written = simulation.clone();
-    let texts = match found.course {
+    let texts = match &found.course {
         Course::Walk(_) => return None,
         Course::Line(f) => {
             let frequency = written.fresh_symbol("s");

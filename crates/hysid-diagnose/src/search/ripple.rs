@@ -37,7 +37,7 @@ const PLACES: f64 = 3.0;
 /// none where nothing moves far enough.
 pub fn residual_periods(base: &Base<'_>, structure: &Structure, r: &[f64]) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new(); structure.slots.len()];
-    let position = |s: &'_ Slot| s.quantity("x").or(s.quantity("turn")).map(|x| x.expression.clone());
+    let position = |s: &Slot| Some(s.quantity(s.coordinate()?)?.expression.clone());
     let moves = |s: &Slot| matches!(s.place, Place::Force | Place::ForceLaw) && position(s).is_some();
     let places: Vec<usize> = (0..structure.slots.len()).filter(|&i| moves(&structure.slots[i])).take(MOST.0).collect();
     let positions: Vec<Expr> = places.iter().filter_map(|&i| position(&structure.slots[i])).collect();

@@ -84,8 +84,8 @@ impl Finder<'_> {
                 slot.offer(self.simulation, "rad", rad);
             }
         }
-        if let Some(rad) = motion.turn.and_then(|turn| self.simulation.state(turn)) {
-            let rad = linear_coefficient(self.simulation, &rad.derivative, motion.v);
+        if let Some(turn) = motion.turn.and_then(|turn| self.simulation.state(turn)) {
+            let rad = linear_coefficient(self.simulation, &turn.derivative, motion.v);
             slot.offer(self.simulation, "rad", rad.unwrap_or(Expr::Number(1.0)));
         }
         self.offer_force(&mut slot, motion.derivative, motion.x, motion.v, motion.scale.as_ref());

@@ -210,6 +210,19 @@ impl Slot {
         self.symbols.contains_key(symbol)
     }
 
+    /// The symbol of the coordinate that a force may return with: the displacement, or the angle of what turns.
+    pub(crate) fn coordinate(&self) -> Option<&'static str> {
+        ["x", "turn"].into_iter().find(|x| self.has(x))
+    }
+
+    /// The angle in radians, as text, where the coordinate is one.
+    pub(crate) fn angle(&self) -> Option<&'static str> {
+        match self.coordinate()? {
+            "x" => self.has("rad").then_some("rad*x"),
+            turn => Some(turn),
+        }
+    }
+
     /// What a symbol stands for here.
     pub fn quantity(&self, symbol: &str) -> Option<&Quantity> {
         self.symbols.get(symbol)

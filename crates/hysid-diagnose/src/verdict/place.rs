@@ -36,10 +36,11 @@ pub fn place_of_change(h: &Hypothesis<'_>, effect: &Effect) -> Option<String> {
     let expressions: Vec<Expr> = names.iter().map(|n| Expr::symbol(*n)).collect();
     let mut best: Option<(Level, &str, bool)> = None;
     for (name, series) in names.into_iter().zip(along(&h.base, &expressions)?) {
-        let sided = data.stretches.iter().zip(&series).flat_map(|(s, x)| {
-            let period_s = s.drive.period_s();
-            x.iter().enumerate().map(move |(i, x)| (*x, s.start_s + i as f64 * period_s >= moment))
-        });
+        let sided = data
+            .stretches
+            .iter()
+            .zip(&series)
+            .flat_map(|(s, x)| x.iter().zip(s.times()).map(|(x, t)| (*x, t >= moment)));
         let Some((level, after)) = level(sided.collect()) else { continue };
         if best.is_none_or(|(b, ..)| level.wrong < b.wrong) {
             best = Some((level, name, after));

@@ -45,15 +45,11 @@ impl Plays {
     /// What each play weighs, and its half-width.
     fn terms(self) -> Vec<(String, String)> {
         match self.0 {
-            Purpose::Screening
-            | Purpose::Refit
-            | Purpose::Form(Form::Other | Form::Unsettled | Form::Soft | Form::Softer) => {
-                density().map(|(share, radius)| (format!("p*{share}"), radius)).collect()
-            }
             Purpose::Form(Form::Spaced) => (1..=SPACED).map(|i| (format!("p_{i}"), format!("{i}*r_s"))).collect(),
             Purpose::Form(Form::Few | Form::Finer | Form::FinerUnsettled) => {
                 (1..=self.radii().len()).map(|i| (format!("p_{i}"), format!("r_{i}"))).collect()
             }
+            _ => density().map(|(share, radius)| (format!("p*{share}"), radius)).collect(),
         }
     }
 
@@ -93,12 +89,6 @@ impl Plays {
         let law = Law::replace(text);
         let weight = |law: Law, i: usize| law.amplitude(format!("p_{i}"), "1", -0.2, 1.0);
         let law = match self.0 {
-            Purpose::Screening
-            | Purpose::Refit
-            | Purpose::Form(Form::Other | Form::Unsettled | Form::Soft | Form::Softer) => law
-                .amplitude("p", "1", -0.2, 5.0)
-                .shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0]))
-                .constant("r_w", "u", Grid::Reach("u", vec![1.0 / CELLS as f64])),
             Purpose::Form(Form::Spaced) => (1..=SPACED).fold(law, weight).shape(
                 "r_s",
                 "u",
@@ -109,6 +99,11 @@ impl Plays {
                     weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
                 })
             }
+            _ => law.amplitude("p", "1", -0.2, 5.0).shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0])).constant(
+                "r_w",
+                "u",
+                Grid::Reach("u", vec![1.0 / CELLS as f64]),
+            ),
         };
         let law = if self.unsettled() {
             with_duration(law).shape("u_s", "u", Grid::Values(vec![-2.0, 0.0, 2.0])).within(-10.0, 10.0)
@@ -152,12 +147,8 @@ mod tests {
         match purpose {
             Purpose::Form(Form::Few) => six[..3].to_vec(),
             Purpose::Form(Form::Finer | Form::FinerUnsettled) => six.to_vec(),
-            Purpose::Screening
-            | Purpose::Refit
-            | Purpose::Form(Form::Other | Form::Unsettled | Form::Soft | Form::Softer) => {
-                vec![("p", 0.4), ("r_d", 4.0)]
-            }
             Purpose::Form(Form::Spaced) => six.into_iter().chain([("r_s", 1.3)]).collect(),
+            _ => vec![("p", 0.4), ("r_d", 4.0)],
         }
     }
 

@@ -1,7 +1,7 @@
 //! An input that does not grow beyond a limit.
 
 use crate::mechanism::limit::{each_side, limited};
-use crate::mechanism::{Block, Family, Grid, Mechanism, Need, anywhere};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
 /// An input that does not grow beyond a limit.
@@ -22,7 +22,17 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
                 .shape("s", "u", Grid::Quantiles("u", quantiles.to_vec()))
                 .searched();
         }
-        limited("u", &quantiles, purpose)
+        // What gives way by and by, an amplifier or a core (Froelich's curve): the recording need not come near the limit. Of a force that is measured under a
+        // prescribed motion it would imitate whatever softens (a rocking wall, a damper): sensors have no such forms.
+        let by_and_by = |text: &str| {
+            let reach = Grid::Reach("u", vec![0.7, 1.5, 3.0, 6.0]);
+            Law::replace(text).shape("s_t", "u", reach).silent().report("s", "u", "s_t")
+        };
+        match purpose {
+            Purpose::Form(Form::Soft) => by_and_by("s_t*tanh(u/s_t)"),
+            Purpose::Form(Form::Softer) => by_and_by("u/(1 + abs(u)/s_t)"),
+            _ => limited("u", &quantiles, purpose),
+        }
     },
     contains: &[],
     confusable: &["output_saturation", "input_polynomial"],

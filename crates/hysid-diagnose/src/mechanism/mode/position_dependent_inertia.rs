@@ -46,7 +46,7 @@ fn with_the_square(slot: &Slot) -> Law {
 
 /// A wave of so many periods a turn, at any phase, with nothing more where the angle is zero.
 fn over_the_turn(slot: &Slot, periods: &str) -> Law {
-    let angle = format!("{periods}*{}", if slot.has("turn") { "turn" } else { "rad*x" });
+    let angle = format!("{periods}*{}", slot.angle().unwrap_or("rad*x"));
     let force = format!("0.5*{periods}*rad*(m_c*sin({angle}) + m_s*cos({angle}))*{}", squared_velocity(slot));
     Law::inertia(force, format!("m_c*(1 - cos({angle})) + m_s*sin({angle})"))
         .amplitude("m_c", slot.mass_measure(), -0.4, 2.0)

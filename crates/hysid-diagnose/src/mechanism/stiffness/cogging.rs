@@ -9,10 +9,10 @@ pub static COGGING: Mechanism = Mechanism {
     family: Family::PositionRipple,
     block: Block::Restoring,
     places: &[Place::Force, Place::ForceLaw],
-    applies: |slot| slot.has("x") || slot.has("turn"),
+    applies: |slot| slot.coordinate().is_some(),
     already: &["sin(2*pi*x/P)", "sin(2*pi/P*x)", "sin(P*x)", "sin(P*x + Q)"],
     law: |slot, _| {
-        let x = if slot.has("x") { "x" } else { "turn" };
+        let x = slot.coordinate().unwrap_or("x");
         Law::force(format!("A_s*sin(2*pi*{x}/p_x) + A_c*cos(2*pi*{x}/p_x)"))
             .amplitude("A_s", "F", -1.0, 1.0)
             .silent()

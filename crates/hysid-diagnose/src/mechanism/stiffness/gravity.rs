@@ -9,11 +9,11 @@ pub static GRAVITY: Mechanism = Mechanism {
     family: Family::Gravity,
     block: Block::Restoring,
     places: &[Place::Force],
-    applies: |slot| (slot.has("x") && slot.has("rad")) || slot.has("turn"),
+    applies: |slot| slot.angle().is_some(),
     already: &["sin(rad*x)", "sin(x)", "sin(P*x)", "sin(x*P)", "sin(x + P)", "sin(x - P)", "cos(x)", "cos(x + P)"],
     law: |slot, purpose| {
         // What turns and is out of balance is pulled as an arm is.
-        let angle = if slot.has("turn") { "turn" } else { "rad*x" };
+        let angle = slot.angle().unwrap_or("rad*x");
         // An angle is mostly counted from where the arm hangs or from where it is level.
         let one = |name: &str, wave: &str, phase: &str| {
             Law::force(format!("{name}*{wave}({angle})"))
