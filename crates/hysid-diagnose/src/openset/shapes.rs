@@ -202,10 +202,11 @@ pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
     out
 }
 
-/// A coordinate with a coefficient that follows an input or its size.
-pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 2] {
+/// A coordinate with a coefficient that follows an input, its size or its square, as a brake in series with a motor does.
+pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 3] {
     [
         product((u, input), (name, x)),
+        Shape::new(format!("{u}^2*{name}"), Kind::Odd, both(input, x, |u, x| u * u * x)),
         Shape::new(format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)),
     ]
 }

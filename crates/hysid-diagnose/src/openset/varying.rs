@@ -61,6 +61,11 @@ pub struct Varying {
 }
 
 impl Varying {
+    /// The log evidence beside an effect that changes in time too: that what is slow is no noise neither has to show.
+    pub fn gain_as_a_rival(&self) -> f64 {
+        self.gain + if matches!(self.course, Course::Walk(_)) { SLOW } else { 0.0 }
+    }
+
     /// In words.
     pub fn words(&self) -> String {
         let what = if self.input { "the gain of the input" } else { "the parameter" };

@@ -1,6 +1,6 @@
 //! The slots of a simulation, found from its equations.
 
-use hysid_plant::{Expr, Memory, Simulation, State, Unit};
+use hysid_plant::{Expr, Function, Memory, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
 use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
@@ -282,7 +282,20 @@ impl Finder<'_> {
         slot.offer(self.simulation, "s", Expr::symbol(name));
         self.offer_force(&mut slot, derivative, Some(name), name, None);
         slot.context = vec![derivative.clone()];
+        slot.feeds = self.feeds(name, derivative);
         slot
+    }
+
+    /// Whether a root that drains a store stands in the balance of another state as well.
+    fn feeds(&self, name: &str, derivative: &Expr) -> bool {
+        let mut found = false;
+        derivative.visit(&mut |e| {
+            if matches!(e, Expr::Call(Function::Sqrt, _)) && e.uses(name) {
+                let others = self.simulation.states.iter().filter(|s| s.name != name);
+                others.for_each(|s| s.derivative.visit(&mut |o| found |= o == e));
+            }
+        });
+        found
     }
 
     fn stores(&self) -> Vec<Slot> {

@@ -148,6 +148,7 @@ pub struct Slot {
     constant: bool,
     loops: bool,
     mass: bool,
+    feeds: bool,
 }
 
 /// What a symbol of a law stands for at a slot.
@@ -190,6 +191,7 @@ impl Slot {
             constant: false,
             loops: false,
             mass: false,
+            feeds: false,
         }
     }
 
@@ -359,6 +361,11 @@ impl Slot {
     pub(crate) fn separation(&self) -> Option<Expr> {
         let Some(Quantity { expression: Expr::Symbol(x), .. }) = self.symbols.get("x") else { return None };
         self.context.iter().find_map(|e| pattern::step_in(e, x))
+    }
+
+    /// Whether what leaves this store by its own outflow arrives in another one.
+    pub(crate) fn feeds_another(&self) -> bool {
+        self.feeds
     }
 
     /// Whether the equations here contain a square root of an expression that uses this symbol.

@@ -51,8 +51,12 @@ pub fn firmness(
         let of_plays = !own.members_imitate()
             && best.effects.iter().any(|o| o.mechanism.family.members_imitate())
             && brings_little(pool, winner, i);
+        // A loop with unequal sides is a sum of plays and a curve: a curve at the same signal may be what another law of such loops has in one.
+        let of_a_loop = own == Family::InputNonlinearity
+            && best.effects.iter().any(|o| o.mechanism.family.members_imitate() && o.slot.label == e.slot.label);
         let vague = own.stands_for_others()
             || of_plays
+            || of_a_loop
             || of_turned_noise
             || of_rounding
             || of_a_spectrum

@@ -4,11 +4,10 @@ use super::firmness::{firmness, likelihoods};
 use super::remaining::Remaining;
 use super::trifles::{Trifle, without_trifles};
 use super::veto::{found_too_little, veto};
-use super::wanders::{Wanders, wanders};
+use super::wanders::{Wanders, is_one_course, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
-use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::explore::Explored;
@@ -157,12 +156,8 @@ impl<'d> Judgement<'d> {
     pub fn steady(&self, pool: &[Hypothesis<'_>]) -> usize {
         let best = &pool[self.winner];
         let wanders = |i: usize| self.wandering[i].as_ref().is_some_and(|w| w.probability > LIKELY);
-        let changes = |i: usize, at: &str| {
-            best.effects[i].mechanism.family == Family::TimeVariation && best.effects[i].slot.label == at
-        };
         let all = 0..best.effects.len();
-        let key =
-            best.key_of(|i| !all.clone().any(|j| wanders(j) && (i == j || changes(i, &best.effects[j].slot.label))));
+        let key = best.key_of(|i| !all.clone().any(|j| wanders(j) && is_one_course(best, i, j)));
         let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence - pool[0].log_evidence)).collect();
         place_of(&sets, &key, STEADY * sets[self.winner].1)
     }

@@ -93,15 +93,15 @@ impl<'d> Remaining<'d> {
         self.foreign || self.spectrum || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
     }
 
-    /// The simulation with a sparse correction in its equations, refitted: on top of the winning set or in its place, whichever has more
-    /// evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool):
+    /// The simulation with a sparse correction in its equations, refitted: on top of the winning set, where that is `trusted` on other inputs, or in its
+    /// place, whichever has more evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool):
     /// three or four blocks tell little of a mismatch far below the noise, so they need not rule out chance where the evidence does.
     pub fn modelled(
         &mut self,
         search: &Search<'_, 'd>,
         pool: &[Hypothesis<'d>],
         winner: usize,
-        otherwise: usize,
+        (trusted, otherwise): (bool, usize),
     ) -> Option<Hypothesis<'d>> {
         // Where a parameter walks, another recording sees another walk: functions of the time that follow this one are no use there.
         if self.told().is_some_and(|o| o.words.is_some() && o.writable.is_none()) {
@@ -114,8 +114,8 @@ impl<'d> Remaining<'d> {
             Some((refitted, of)) => (refitted, of, true),
             None => {
                 let tried = self.tried.take();
-                let on_top =
-                    self.open.as_ref().and_then(|o| Some((o, fitted(setting, &pool[winner], o.writable.as_ref()?)?)));
+                let left = self.open.as_ref().filter(|_| trusted);
+                let on_top = left.and_then(|o| Some((o, fitted(setting, &pool[winner], o.writable.as_ref()?)?)));
                 let generic = if winner > 0 { search.open(&pool[0]) } else { None };
                 let instead = generic.as_ref().and_then(|o| {
                     let refitted = tried.or_else(|| fitted(setting, &pool[0], o.writable.as_ref()?))?;

@@ -22,7 +22,8 @@ pub struct Wanders {
     pub words: String,
 }
 
-/// The probability that a change depends on the place where that explains it as well: as likely, and another recording is safer without it.
+/// The probability that a change depends on the place where that explains it as well, or is a course of its own where it takes two to tell it: as
+/// likely, and another recording is safer without it.
 const AS_WELL: f64 = 0.6;
 /// Below this probability nothing is said of it.
 const WORTH_SAYING: f64 = 0.02;
@@ -39,7 +40,7 @@ impl Wanders {
 }
 
 /// For each effect of a set that changes a parameter in time, a parameter that varies otherwise; `None` for the others, where nothing that varies is
-/// seen, and where the set without the effect was not fitted.
+/// seen, and where the set without the effect, and without what else changes that parameter, was not fitted.
 pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) -> Vec<Option<Wanders>> {
     let best = &pool[winner];
     let of = |member: usize| {
@@ -49,16 +50,33 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
         if let Some(words) = place_of_change(best, &best.effects[member]) {
             return Some(Wanders { probability: AS_WELL, words });
         }
-        let rest = &pool[best_that_says(pool, &best.key_without(member))?];
+        let course = |i: usize| is_one_course(best, i, member);
+        // One parameter that changes in two ways at once does what it likes.
+        let several = (0..best.effects.len()).filter(|&i| course(i)).count() > 1;
+        let as_well = several.then(|| Wanders { probability: AS_WELL, words: own_course(&best.effects[member]) });
+        let Some(rest) = best_that_says(pool, &best.key_of(|i| !course(i))) else { return as_well };
+        let rest = &pool[rest];
         let kind = search.setting.noise;
-        let found = varying(&rest.base, kind, &noises(&rest.base, kind))?;
+        let Some(found) = varying(&rest.base, kind, &noises(&rest.base, kind)) else { return as_well };
         // What varies has paid for the parameters among which it was found; a moment was looked for too.
         let places = search.places_of(&best.effects[member]).ln();
-        let lead = best.log_evidence - rest.log_evidence - places - found.gain;
+        let lead = best.log_evidence - rest.log_evidence - places - found.gain_as_a_rival();
         let probability = 1.0 / (1.0 + (EVIDENCE_WEIGHT * lead).exp());
-        Some(Wanders { probability, words: found.words() })
+        let found = Wanders { probability, words: found.words() };
+        Some(as_well.filter(|w| w.probability > found.probability).unwrap_or(found))
     };
     (0..best.effects.len()).map(of).collect()
+}
+
+fn own_course(e: &Effect) -> String {
+    format!("a course in time of its own at {}", e.slot.label)
+}
+
+/// Whether two members of a set are parts of one course in time: the same, or two that change one parameter.
+pub fn is_one_course(set: &Hypothesis<'_>, one: usize, other: usize) -> bool {
+    let changes = |e: &Effect| e.mechanism.family == Family::TimeVariation;
+    let (a, b) = (&set.effects[one], &set.effects[other]);
+    one == other || (changes(a) && changes(b) && a.slot.label == b.slot.label)
 }
 
 #[cfg(test)]
@@ -73,26 +91,34 @@ mod tests {
     use crate::openset::varying::tests::{BASELINE, recorded};
     use crate::request::{Hooks, Options};
 
-    /// The probability that the stiffness of an oscillator wanders, beside an abrupt change of it, where it is multiplied by this function of the time.
-    fn beside_a_change(factor: impl Fn(f64) -> f64) -> f64 {
+    /// The probabilities that the stiffness of an oscillator wanders, beside each of these changes of it, where it is multiplied by this function of the time.
+    fn beside(changes: &[&str], factor: impl Fn(f64) -> f64) -> Vec<f64> {
         let data = recorded(6, factor, 0.02);
         let budget = Budget::new(&|_| false);
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
         let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
         let search = Search::new(setting, Options::default(), &hooks);
-        let question = vec![("abrupt_change".to_owned(), "parameter:k".to_owned())];
+        let question: Vec<_> = changes.iter().map(|id| ((*id).to_owned(), "parameter:k".to_owned())).collect();
         let changed = search.answer(&none, &question).unwrap();
         assert!(changed.log_evidence > none.log_evidence + SLOW, "{} {}", changed.log_evidence, none.log_evidence);
         let found = wanders(&search, &[none, changed], 1);
-        found[0].as_ref().map_or(0.0, |w| w.probability)
+        found.iter().map(|w| w.as_ref().map_or(0.0, |w| w.probability)).collect()
     }
 
     #[test]
     fn a_parameter_that_wanders_is_heard_beside_one_that_changes() {
-        let sure = beside_a_change(|t| if t > 6.0 { 1.03 } else { 1.0 });
+        let sure = beside(&["abrupt_change"], |t| if t > 6.0 { 1.03 } else { 1.0 })[0];
         assert!(sure < 0.02, "{sure}");
-        let walk = beside_a_change(|t| 1.0 + 0.02 * ((0.31 * t).sin() + (0.17 * t).cos() * (0.53 * t).sin()));
+        let walk = |t: f64| 1.0 + 0.02 * ((0.31 * t).sin() + (0.17 * t).cos() * (0.53 * t).sin());
+        let walk = beside(&["abrupt_change"], walk)[0];
         assert!(walk > 0.1, "{walk}");
+    }
+
+    #[test]
+    fn two_changes_of_one_parameter_are_a_course_of_its_own() {
+        let both =
+            beside(&["abrupt_change", "parameter_drift"], |t| 1.0 + if t > 6.0 { 0.03 } else { 0.0 } - 0.003 * t);
+        assert!(both.len() == 2 && both.iter().all(|p| *p >= AS_WELL), "{both:?}");
     }
 }

@@ -9,11 +9,13 @@ pub static LEAKAGE: Mechanism = Mechanism {
     family: Family::Storage,
     block: Block::Damping,
     places: &[Place::Store],
-    applies: |slot| !(slot.has("k") && slot.shows_root("s")),
+    applies: |slot| !(slot.has("k") && slot.shows_root("s")) || slot.feeds_another(),
     already: &[],
     law: |slot, purpose| {
-        // A loss in proportion would be a change of a parameter where the baseline has one.
-        if slot.has("k") || purpose == Purpose::Form(Form::Other) {
+        // A loss in proportion would be a change of a parameter where the baseline has one, and one through an opening where what leaves through one is lost.
+        let opening = slot.has("k") || slot.feeds_another();
+        let other = purpose == Purpose::Form(Form::Other) && !slot.has("k");
+        if opening != other {
             // Torricelli's law; the reference level keeps the unit of q_l that of a flow.
             Law::outflow("q_l*sqrt(max(s, 0)/s_r)").amplitude("q_l", "F", 0.0, 2.0).constant(
                 "s_r",
@@ -31,3 +33,29 @@ pub static LEAKAGE: Mechanism = Mechanism {
     signature: "It drains faster than the simulation, more so when full.",
     reference: "M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noël, Cascaded tanks benchmark combining soft and hard nonlinearities, Workshop on Nonlinear System Identification Benchmarks (2016)",
 };
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::slot::Structure;
+
+    #[test]
+    fn a_tank_that_feeds_another_leaks_through_an_opening_and_the_last_one_in_proportion() {
+        let text = "[time]\ncolumn = \"t_s\"\n[inputs]\nu = \"pump_V\"\n[parameters]\na = { value = 0.1, min = 0.01, max = 1.0 }\n\
+                    [states]\nh1 = { derivative = \"u - a*sqrt(max(h1, 0))\", initial = \"free\", unit = \"cm\" }\n\
+                    h2 = { derivative = \"a*sqrt(max(h1, 0)) - a*sqrt(max(h2, 0))\", initial = \"free\", unit = \"cm\" }\n\
+                    [outputs]\nh2_cm = \"h2\"\n";
+        let structure = Structure::of(&Simulation::parse(text, "tanks").unwrap());
+        let slots = LEAKAGE.slots(&structure);
+        let law = |label: &str, purpose| {
+            let slot = slots.iter().find(|s| s.label == label).unwrap();
+            format!("{:?}", LEAKAGE.law_at(slot, purpose).change)
+        };
+        for (label, first) in [("state:h1", true), ("state:h2", false)] {
+            assert_eq!(law(label, Purpose::Refit).contains("sqrt"), first, "{label}");
+            assert_eq!(law(label, Purpose::Form(Form::Other)).contains("sqrt"), !first, "{label}");
+        }
+    }
+}
