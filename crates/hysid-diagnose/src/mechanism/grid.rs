@@ -15,7 +15,8 @@ pub enum Grid {
     SignedQuantiles(&'static str, Vec<f64>),
     /// That many points inside the recording's duration, in seconds.
     Times(usize),
-    /// That many frequencies over the excited band, in Hz, logarithmic.
+    /// That many frequencies over the excited band, in Hz, logarithmic, and those of the largest peaks of the residual: what rings on after a sweep has
+    /// passed is sharper than any grid.
     Band(usize),
     /// That many time constants from the excited band's fastest to a quarter of the recording, in seconds, logarithmic.
     Memory(usize),

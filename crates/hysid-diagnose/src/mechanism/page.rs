@@ -77,7 +77,7 @@ fn parameters(law: &Law) -> String {
                 Grid::Quantiles(s, v) => format!("{} quantiles of the size of {s}", v.len()),
                 Grid::SignedQuantiles(s, v) => format!("{} quantiles of {s}", v.len()),
                 Grid::Times(n) => format!("{n} moments"),
-                Grid::Band(n) => format!("{n} frequencies of the excited band"),
+                Grid::Band(n) => format!("{n} frequencies of the excited band, peaks of the residual"),
                 Grid::Memory(n) => format!("{n} time constants"),
                 Grid::Peaks(n) => format!("peaks of the residual, else {n} frequencies"),
                 Grid::Resolution => "the recorded steps".to_owned(),

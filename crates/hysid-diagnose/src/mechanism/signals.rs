@@ -160,7 +160,8 @@ impl Signals {
             }
             Grid::Band(count) => {
                 let (low, high) = self.band();
-                super::log_steps(low / 1.5, (high * 1.5).min(0.45 / self.period_s), *count)
+                let steps = super::log_steps(low / 1.5, (high * 1.5).min(0.45 / self.period_s), *count);
+                steps.into_iter().chain(self.pointed(grid).iter().copied()).collect()
             }
             Grid::Memory(count) => {
                 let (_, high) = self.band();
@@ -182,7 +183,11 @@ impl Signals {
 
     /// Values of a grid to which the residual points beside those that are tried on any recording.
     pub(super) fn pointed(&self, grid: &Grid) -> &[f64] {
-        if matches!(grid, Grid::Turns(..)) { &self.periods } else { &[] }
+        match grid {
+            Grid::Turns(..) => &self.periods,
+            Grid::Band(_) => &self.peaks_hz,
+            _ => &[],
+        }
     }
 
     /// What lines are resolved over: the travel of the signal of turns, else the recording's duration.
@@ -300,6 +305,18 @@ mod tests {
     fn the_band_of_a_sine_is_its_line() {
         let (low, high) = sine(2.0).band_hz;
         assert!((low - 2.0).abs() < 0.11 && (high - 2.0).abs() < 0.11, "{low} {high}");
+    }
+
+    #[test]
+    fn a_resonance_is_looked_for_where_the_residual_peaks_too() {
+        let mut s = sine(2.0);
+        let band = s.values(&Grid::Band(5), 1.0);
+        s.peaks_hz = vec![2.345];
+        let with_peaks = s.values(&Grid::Band(5), 1.0);
+        assert!(with_peaks.len() == band.len() + 1 && with_peaks.contains(&2.345), "{with_peaks:?}");
+        // The mismatch test leaves them out.
+        assert_eq!(s.pointed(&Grid::Band(5)), [2.345]);
+        assert!(s.pointed(&Grid::Times(5)).is_empty());
     }
 
     #[test]

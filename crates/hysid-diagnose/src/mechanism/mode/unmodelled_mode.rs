@@ -43,7 +43,7 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
         law.shape("f_a", "1/t", frequencies).shape("zeta_a", "1", dampings).within(0.001, 0.7)
     },
     contains: &[],
-    confusable: &["delay", "viscoelastic"],
+    confusable: &["delay", "viscoelastic", "periodic_disturbance"],
     needs: &[Need::Band(1.5)],
     sentence: "A resonance near {f_a} is missing {place}.",
     signature: "The residual lives in a narrow band, grows in proportion to the input, and its phase flips there.",
