@@ -272,7 +272,7 @@ fn written<'d>(
     }
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {
         (hooks.progress)("writing the correction into the simulation");
-        judged.rest.modelled(search, pool, winner, (winner == 0 || believed, set))
+        judged.rest.modelled(search, pool, winner, winner == 0 || believed, set)
     } else {
         None
     };

@@ -1,10 +1,10 @@
 //! The slots of a simulation, found from its equations.
 
-use hysid_plant::{Expr, Function, Memory, Simulation, State, Unit};
+use hysid_plant::{Expr, Memory, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
 use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
-use super::{OWN_VELOCITY, Place, Pull, Sensed, Slot, Target, sensed};
+use super::{OWN_VELOCITY, Place, Sensed, Slot, Target, sensed};
 
 /// What a simulation is made of, as far as mechanisms care.
 #[derive(Debug, Clone, PartialEq)]
@@ -274,41 +274,6 @@ impl Finder<'_> {
         if let (Some(unit), Some(quantity)) = (Unit::of_column(column), slot.symbols.get_mut(symbol)) {
             quantity.unit = Some(unit);
         }
-    }
-
-    fn store_slot(&self, place: Place, label: String, name: &str, derivative: &Expr) -> Slot {
-        let target = Target::Derivatives(vec![Pull::new(name, 1.0)]);
-        let mut slot = Slot::new(place, label, name.to_owned(), target);
-        slot.offer(self.simulation, "s", Expr::symbol(name));
-        self.offer_force(&mut slot, derivative, Some(name), name, None);
-        slot.context = vec![derivative.clone()];
-        slot.feeds = self.feeds(name, derivative);
-        slot
-    }
-
-    /// Whether a root that drains a store stands in the balance of another state as well.
-    fn feeds(&self, name: &str, derivative: &Expr) -> bool {
-        let mut found = false;
-        derivative.visit(&mut |e| {
-            if matches!(e, Expr::Call(Function::Sqrt, _)) && e.uses(name) {
-                let others = self.simulation.states.iter().filter(|s| s.name != name);
-                others.for_each(|s| s.derivative.visit(&mut |o| found |= o == e));
-            }
-        });
-        found
-    }
-
-    fn stores(&self) -> Vec<Slot> {
-        if self.is_force_law() {
-            return Vec::new();
-        }
-        // Beside a motion a state may be a controller's or a filter's: only what has the unit of something held is a store.
-        let holds = |name: &str| {
-            let unit = self.simulation.unit_of(name);
-            self.motions.is_empty() || (!self.moves(name) && unit.is_some_and(|u| is_one_of(&u, &["Pa", "K", "m^3"])))
-        };
-        let states = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some() && holds(&s.name));
-        states.map(|s| self.store_slot(Place::Store, format!("state:{}", s.name), &s.name, &s.derivative)).collect()
     }
 
     fn sensors(&self) -> Vec<Slot> {

@@ -21,6 +21,7 @@ mod loops;
 mod motion;
 mod pattern;
 mod sensed;
+mod stores;
 mod turn;
 
 use std::collections::BTreeMap;
@@ -372,13 +373,6 @@ impl Slot {
     pub(crate) fn shows_root(&self, symbol: &str) -> bool {
         let Some(quantity) = self.symbols.get(symbol) else { return false };
         let used = quantity.expression.symbols();
-        let mut found = false;
-        for e in &self.context {
-            e.visit(&mut |e| {
-                found |= matches!(e, Expr::Call(Function::Sqrt, a)
-                    if a.iter().any(|a| used.iter().any(|s| a.uses(s))));
-            });
-        }
-        found
+        self.context.iter().flat_map(pattern::roots).any(|root| used.iter().any(|s| root.uses(s)))
     }
 }

@@ -45,6 +45,17 @@ pub(super) fn occurs(form: &Expr, expr: &Expr) -> bool {
     found
 }
 
+/// The square roots in `expr`.
+pub(super) fn roots(expr: &Expr) -> Vec<&Expr> {
+    let mut found = Vec::new();
+    expr.visit(&mut |e| {
+        if matches!(e, Expr::Call(Function::Sqrt, _)) {
+            found.push(e);
+        }
+    });
+    found
+}
+
 /// The first part of `expr` that has this form.
 pub(super) fn part(form: &Expr, expr: &Expr) -> Option<Expr> {
     let mut found = None;

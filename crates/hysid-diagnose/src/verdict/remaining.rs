@@ -101,7 +101,8 @@ impl<'d> Remaining<'d> {
         search: &Search<'_, 'd>,
         pool: &[Hypothesis<'d>],
         winner: usize,
-        (trusted, otherwise): (bool, usize),
+        trusted: bool,
+        otherwise: usize,
     ) -> Option<Hypothesis<'d>> {
         // Where a parameter walks, another recording sees another walk: functions of the time that follow this one are no use there.
         if self.told().is_some_and(|o| o.words.is_some() && o.writable.is_none()) {

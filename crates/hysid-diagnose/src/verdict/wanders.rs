@@ -4,12 +4,14 @@
 //! these effects, around the set without that effect. So is what depends on the place, where the recording was on either side of a level only before and
 //! only after the moment of a change.
 
+use std::collections::BTreeMap;
+
 use super::place::place_of_change;
 use super::weigh::EVIDENCE_WEIGHT;
 use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
 use crate::openset::noises;
-use crate::openset::varying::varying;
+use crate::openset::varying::{Varying, varying};
 use crate::search::Search;
 use crate::text::number;
 
@@ -43,6 +45,9 @@ impl Wanders {
 /// seen, and where the set without the effect, and without what else changes that parameter, was not fitted.
 pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) -> Vec<Option<Wanders>> {
     let best = &pool[winner];
+    let kind = search.setting.noise;
+    // What varies around a set, which members of one course share.
+    let mut heard: BTreeMap<usize, Option<Varying>> = BTreeMap::new();
     let of = |member: usize| {
         if best.effects[member].mechanism.family != Family::TimeVariation {
             return None;
@@ -55,12 +60,12 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
         let several = (0..best.effects.len()).filter(|&i| course(i)).count() > 1;
         let as_well = several.then(|| Wanders { probability: AS_WELL, words: own_course(&best.effects[member]) });
         let Some(rest) = best_that_says(pool, &best.key_of(|i| !course(i))) else { return as_well };
-        let rest = &pool[rest];
-        let kind = search.setting.noise;
-        let Some(found) = varying(&rest.base, kind, &noises(&rest.base, kind)) else { return as_well };
+        let base = &pool[rest].base;
+        let found = heard.entry(rest).or_insert_with(|| varying(base, kind, &noises(base, kind)));
+        let Some(found) = found else { return as_well };
         // What varies has paid for the parameters among which it was found; a moment was looked for too.
         let places = search.places_of(&best.effects[member]).ln();
-        let lead = best.log_evidence - rest.log_evidence - places - found.gain_as_a_rival();
+        let lead = best.log_evidence - pool[rest].log_evidence - places - found.gain_as_a_rival();
         let probability = 1.0 / (1.0 + (EVIDENCE_WEIGHT * lead).exp());
         let found = Wanders { probability, words: found.words() };
         Some(as_well.filter(|w| w.probability > found.probability).unwrap_or(found))

@@ -26,7 +26,7 @@ pub static COGGING: Mechanism = Mechanism {
             .report("phi", "1", "atan2(A_c, A_s)")
     },
     contains: &["gravity"],
-    confusable: &["stribeck_friction", "cubic_stiffness", "gravity"],
+    confusable: &["stribeck_friction", "cubic_stiffness"],
     needs: &[Need::Varies("v")],
     sentence: "A force of {A} repeats every {p_x} of travel {place}; the simulation has none.",
     signature: "Lines whose frequency follows the speed; periodic in the position.",
