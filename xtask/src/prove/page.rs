@@ -93,6 +93,15 @@ pub fn times(seconds: &[f64]) -> String {
     )
 }
 
+/// Head of the table of competitors.
+const COMPETITORS: [&str; 5] = ["", "DNR < 0.4", "0.5", "1", "3"];
+
+/// One line of that table for each competitor.
+fn competitors(score: &Score) -> impl Iterator<Item = Vec<String>> {
+    let medians = |m: &[f64]| m.iter().map(|v| number(*v, false)).collect::<Vec<_>>();
+    score.competitors.iter().map(move |(name, m)| [vec![name.clone()], medians(m)].concat())
+}
+
 /// The result as Markdown.
 pub fn markdown(score: &Score, command: &str, took: f64, rows: &[Row]) -> String {
     let cut = rows.iter().filter(|r| !r.rivals.oracle_complete).count();
@@ -114,16 +123,10 @@ pub fn markdown(score: &Score, command: &str, took: f64, rows: &[Row]) -> String
     table(&mut text, &gathered_by("DNR"), gathered(&score.cells));
     let _ = writeln!(text, "{SEEN_MEANS}\n");
     table(&mut text, &gathered_by(SEEN), gathered(&score.seen));
-    text.push_str("Median held-out error over that of the recalibrated simulation, effects of the catalogue:\n\n");
-    table(
-        &mut text,
-        &["", "DNR < 0.4", "0.5", "1", "3"],
-        score.competitors.iter().map(|(name, medians)| {
-            let mut row = vec![name.clone()];
-            row.extend(medians.iter().map(|m| number(*m, false)));
-            row
-        }),
-    );
+    if !score.competitors.is_empty() {
+        text.push_str("Median held-out error over that of the recalibrated simulation, effects of the catalogue:\n\n");
+        table(&mut text, &COMPETITORS, competitors(score));
+    }
     text.push_str("What single effects, laws outside the catalogue and controls were taken for (true family, said, cases), errors only:\n\n");
     let mut wrong: Vec<(&(String, String), &usize)> =
         score.confusion.iter().filter(|((a, b), _)| a != b && !(a == "nothing" && b == "nothing")).collect();
@@ -177,7 +180,7 @@ pub fn cases(rows: &[Row]) -> String {
         };
         let _ = writeln!(
             text,
-            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} seen={:.0} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} linear={:.3} own={:?}/{:?} sep={:?} {:.1}s{}",
+            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} seen={:.0} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} own={:?}/{:?} sep={:?} {:.1}s{}",
             r.label.id,
             r.label.group,
             r.label.plant,
@@ -191,7 +194,6 @@ pub fn cases(rows: &[Row]) -> String {
             r.rivals.before,
             r.after(),
             r.rivals.oracle,
-            r.rivals.linear,
             own.map(|f| (f.1 / f.0).sqrt()),
             r.verdict().and_then(|v| v.own_black_box),
             r.rivals.separation,
@@ -259,16 +261,13 @@ pub fn html(score: &Score, command: &str, took: f64, rows: &[Row]) -> String {
         .with("perfect", Tone::Faint, Mark::Line, diagonal)
         .with("stated", Tone::After, Mark::Dots, score.bins.iter().map(|b| (b.0, b.1)).collect());
     page.figure(reliability.svg(), "Calibration of the mechanisms' probabilities.");
-    page.section(
-        "Competitors",
-        "Median held-out error over that of the recalibrated simulation, against outputs without noise.",
-    );
-    let body = score
-        .competitors
-        .iter()
-        .map(|(n, m)| std::iter::once(n.clone()).chain(m.iter().map(|v| number(*v, false))).collect())
-        .collect();
-    page.table(&tabled(&["", "DNR < 0.4", "0.5", "1", "3"], body));
+    if !score.competitors.is_empty() {
+        page.section(
+            "Competitors",
+            "Median held-out error over that of the recalibrated simulation, against outputs without noise.",
+        );
+        page.table(&tabled(&COMPETITORS, competitors(score).collect()));
+    }
     page.section("Confusion", "True family, what was said, number of cases.");
     let body = score.confusion.iter().map(|((a, b), n)| vec![a.clone(), b.clone(), n.to_string()]).collect();
     page.table(&tabled(&["true family", "said", "cases"], body));

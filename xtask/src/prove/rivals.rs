@@ -1,4 +1,5 @@
-//! What the same recordings give without a diagnosis (recalibration), and with the truth known beforehand (the oracle).
+//! What the same recordings give without a diagnosis (recalibration), with the truth known beforehand (the oracle), and by
+//! models that know nothing of the catalogue (the competitors).
 //!
 //! Errors are against the outputs without noise, in units of the noise, free run over the hold-out.
 
@@ -28,6 +29,17 @@ pub struct Rivals {
     pub oracle: f64,
     /// The search for that estimate came to its end within [`PATIENCE`].
     pub oracle_complete: bool,
+    /// Log likelihood ratio of the truth over the best baseline, in nats ([`visible`]).
+    pub visible: f64,
+    /// For a law outside the catalogue: squared distance in units of the noise to the best law inside, after its refit.
+    pub separation: Option<f64>,
+    /// The competitors, where they are run.
+    pub competitors: Option<Competitors>,
+}
+
+/// Errors of models that know nothing of the catalogue.
+#[derive(Debug, Clone)]
+pub struct Competitors {
     /// Linear black box (output-error model).
     pub linear: f64,
     /// The same at 1.5 times the amplitude.
@@ -38,13 +50,9 @@ pub struct Rivals {
     pub narx: Errors,
     /// NARX on what the recalibrated baseline leaves.
     pub narx_on_residual: Errors,
-    /// Log likelihood ratio of the truth over the best baseline, in nats ([`visible`]).
-    pub visible: f64,
-    /// For a law outside the catalogue: squared distance in units of the noise to the best law inside, after its refit.
-    pub separation: Option<f64>,
 }
 
-impl Rivals {
+impl Competitors {
     /// Smallest error of a black box at 1.5 times the amplitude.
     pub fn best_black_box_louder(&self) -> Option<f64> {
         [self.linear_louder, self.narx.1, self.narx_on_residual.1].into_iter().flatten().reduce(f64::min)
@@ -58,8 +66,8 @@ const LOOK: usize = 2000;
 /// Time that the oracle of one case may take.
 pub const PATIENCE: Duration = Duration::from_secs(240);
 
-/// Fits and runs the competitors.
-pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
+/// Recalibrates the baseline, refits the truth, and runs the competitors where they are wanted.
+pub fn rivals(bench: &Bench, case: &Case, with_competitors: bool) -> Rivals {
     let baseline = case.design.baseline(&case.machine.effects);
     let recorded = Target { input: &case.est.input, y: &case.est.y };
     let sigma = &case.label.sigma;
@@ -67,22 +75,29 @@ pub fn rivals(bench: &Bench, case: &Case) -> Rivals {
         refit(&baseline, recorded, sigma, Scope::Plant, case.free_initial, 12).map_or(baseline, |r| r.machine);
     let (truth, oracle_complete) = oracle(&case.machine, recorded, sigma, case.free_initial, PATIENCE)
         .map_or_else(|| (case.machine.clone(), false), |e| (e.refit.machine, e.complete));
+    Rivals {
+        before: error(case, &calibrated, &case.val),
+        oracle: error(case, &truth, &case.val),
+        oracle_complete,
+        visible: visible(case),
+        separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
+        competitors: with_competitors.then(|| competitors(bench, case, &calibrated)),
+    }
+}
+
+/// Fits and runs the competitors.
+fn competitors(bench: &Bench, case: &Case, calibrated: &Machine) -> Competitors {
     let black = linear::fit(&case.est);
     let linear = |record: &Record| {
         black.as_ref().map_or(f64::INFINITY, |b| distance(&b.run(&record.input), &record.clean, &case.label.sigma))
     };
     let (short, unknown) = (case.label.samples <= LONGEST, (f64::NAN, None));
-    Rivals {
-        before: error(case, &calibrated, &case.val),
-        oracle: error(case, &truth, &case.val),
-        oracle_complete,
+    Competitors {
         linear: linear(&case.val),
         linear_louder: case.louder.as_ref().map(linear),
-        sindy: sindy::discrepancy(case, &calibrated).map(|m| error(case, &m, &case.val)),
+        sindy: sindy::discrepancy(case, calibrated).map(|m| error(case, &m, &case.val)),
         narx: if short { bench.narx(case) } else { unknown },
-        narx_on_residual: if short { bench.narx_on_residual(case, &calibrated) } else { unknown },
-        visible: visible(case),
-        separation: (case.label.group == Group::Outside).then(|| separation(case, &calibrated)),
+        narx_on_residual: if short { bench.narx_on_residual(case, calibrated) } else { unknown },
     }
 }
 

@@ -117,7 +117,7 @@ pub type OnBlocks = (f64, Vec<f64>);
 pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<OnBlocks> {
     let data = setting.data;
     let weights = held_out_blocks(&data.layout, &data.y);
-    let options = LmOptions { iterations: 5, ..LmOptions::default() };
+    let options = LmOptions::within(5, data.rows());
     let fit = go_on(&h.base.model, &h.base.fit, &data.layout, &h.base.whitener, Some(&weights), options)?;
     let white = h.base.whitener.apply(&data.layout, &fit.residual);
     let scales = data.scales();
@@ -187,7 +187,7 @@ impl<'d> Setting<'d> {
         iterations: usize,
     ) -> Option<Base<'d>> {
         let model = Model::new(document, self.data, self.substeps).ok()?;
-        let options = LmOptions { iterations, ..LmOptions::default() };
+        let options = LmOptions::within(iterations, self.data.rows());
         fit_simulation(model, start, &self.pushed, noise, rounds, options, self.noise)
     }
 

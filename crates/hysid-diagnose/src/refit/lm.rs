@@ -26,8 +26,18 @@ pub trait Problem: Sync {
 pub struct LmOptions {
     /// Most iterations (each one tangent and one or more simulations).
     pub iterations: usize,
-    /// Relative decrease of the cost below which the fit has converged.
+    /// Relative decrease of the cost below which the fit has converged: that of a step, or of all that are left if predictions were linear.
     pub tolerance: f64,
+}
+
+/// Log likelihood, in nats, that a fit need not go on for: less than a twentieth of a standard deviation of one unknown.
+const NEGLIGIBLE: f64 = 1e-3;
+
+impl LmOptions {
+    /// At most so many iterations on so many rows of unknown noise: to within [`NEGLIGIBLE`] of the likeliest.
+    pub fn within(iterations: usize, rows: usize) -> Self {
+        Self { iterations, tolerance: 2.0 * NEGLIGIBLE / rows.max(1) as f64 }
+    }
 }
 
 impl Default for LmOptions {
@@ -99,7 +109,7 @@ fn descend(
     }
     let bounds = problem.bounds();
     let scale = vec![0.0; point.theta.len()];
-    let mut descent = Descent { problem, weighting, point, scale, mu: 1e-3, nu: 2.0 };
+    let mut descent = Descent { problem, weighting, point, scale, mu: DAMPING, nu: 2.0 };
     let mut converged = descent.scale.is_empty();
     let (mut iterations, mut small_steps) = (0, 0);
     while iterations < options.iterations && !converged {
@@ -159,6 +169,8 @@ enum Outcome {
 const TRIES: usize = 12;
 /// Share of the predicted gain that a step must bring.
 const WORTH: f64 = 1e-4;
+/// Damping at the start, and the least after a step that failed: under less the next would be the same one again.
+const DAMPING: f64 = 1e-3;
 
 /// A fit under way.
 struct Descent<'a> {
@@ -186,10 +198,13 @@ impl Descent<'_> {
         }
         let system = System::new(&columns, &gradient, &free, &self.scale);
         let cost = self.point.cost;
+        // Told beforehand, the last step of a fit, whose gain is nothing, is not simulated.
+        if system.step(0.0).is_some_and(|whole| system.predicted(&whole) <= tolerance * cost) {
+            return Outcome::Ended;
+        }
         for tries in 0..TRIES {
             let Some(step) = system.step(self.mu) else {
-                self.mu = (self.mu * self.nu).max(1e-10);
-                self.nu *= 2.0;
+                self.dampen();
                 continue;
             };
             let trial = self.moved(&free, &step);
@@ -226,7 +241,7 @@ impl Descent<'_> {
     }
 
     fn dampen(&mut self) {
-        self.mu *= self.nu;
+        self.mu = (self.mu * self.nu).max(DAMPING);
         self.nu *= 2.0;
     }
 

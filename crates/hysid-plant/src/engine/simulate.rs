@@ -19,12 +19,13 @@ impl Compiled {
         let mut tangents = Vec::with_capacity(directions.len());
         let mut rest = directions;
         while !rest.is_empty() {
-            let (chunk, next) = rest.split_at(rest.len().min(8));
+            let (chunk, next) = rest.split_at(rest.len().min(12));
             let (r, t) = match chunk.len() {
                 // One tangent by itself is slower than two: the compiler pairs it with the value.
                 1..=2 => self.machine::<Lanes<1, 2>>(run, chunk),
                 3..=4 => self.machine::<Lanes<1, 4>>(run, chunk),
-                _ => self.machine::<Lanes<1, 8>>(run, chunk),
+                5..=8 => self.machine::<Lanes<1, 8>>(run, chunk),
+                _ => self.machine::<Lanes<1, 12>>(run, chunk),
             };
             tangents.extend(t);
             response = Some(r);

@@ -18,13 +18,9 @@ fn row(group: Group, diagnosis: &dyn Fn(&Label) -> String, after: Option<f64>) -
         before: 1.0,
         oracle: 0.1,
         oracle_complete: true,
-        linear: 0.7,
-        linear_louder: None,
-        sindy: None,
-        narx: (0.6, None),
-        narx_on_residual: (0.6, None),
         visible: 200.0,
         separation: Some(100.0),
+        competitors: None,
     };
     Row::new(&case, trial, rivals)
 }
