@@ -5,7 +5,9 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use hysid_concealed::case::{Group, Label};
+use anyhow::ensure;
+use hysid_concealed::case::{Group, Label, Wanted};
+use hysid_concealed::noise::Noise;
 
 use super::trial::{Bench, Trial};
 use super::verdict::Verdict;
@@ -38,7 +40,13 @@ impl Control {
 
 /// Diagnoses the controls of the bank; prints the false alarms and writes `controls.txt`, one line for each control.
 pub(super) fn run(bench: &Bench, bank: &Bank, args: &Args, start: Instant) -> anyhow::Result<()> {
-    let list = bank.each(&|plan| plan.group == Group::Control, &|case| {
+    let kinds: Vec<&str> = Noise::ALL.iter().map(|noise| noise.name()).collect();
+    if let Some(kind) = &args.noise {
+        ensure!(kinds.contains(&kind.as_str()), "--noise {kind}: the kinds are {}", kinds.join(", "));
+    }
+    let heard = |noise: Noise| args.noise.as_ref().is_none_or(|kind| kind == noise.name());
+    let wanted = |plan: &Wanted| plan.group == Group::Control && plan.noise.is_some_and(heard);
+    let list = bank.each(&wanted, &|case| {
         Ok(Control { label: case.label.clone(), trial: bench.run(case)? })
     })?;
     let command = super::command(args, bank.range.len());

@@ -63,6 +63,9 @@ pub struct Args {
     /// Only the controls among the cases, where nothing is missing: false alarms in all and for each kind of noise; docs/proof.md is left alone
     #[arg(long, conflicts_with_all = ["quick", "write"])]
     controls: bool,
+    /// Of the controls only those under this kind of noise, such as process
+    #[arg(long, value_name = "KIND", requires = "controls")]
+    noise: Option<String>,
     /// Print how often statements of a given probability are right, and write them to statements.csv, for `cargo xtask reliability`
     #[arg(long, requires = "development")]
     reliability: bool,
@@ -217,6 +220,9 @@ fn command(args: &Args, count: usize) -> String {
     let mut text = format!("cargo xtask prove --seed {} --cases {count}", args.seed);
     if let Some(longest) = args.longest {
         text.push_str(&format!(" --longest {longest}"));
+    }
+    if let Some(noise) = &args.noise {
+        text.push_str(&format!(" --noise {noise}"));
     }
     if args.first > 0 {
         text.push_str(&format!(" --first {}", args.first));
