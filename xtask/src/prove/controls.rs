@@ -46,9 +46,7 @@ pub(super) fn run(bench: &Bench, bank: &Bank, args: &Args, start: Instant) -> an
     }
     let heard = |noise: Noise| args.noise.as_ref().is_none_or(|kind| kind == noise.name());
     let wanted = |plan: &Wanted| plan.group == Group::Control && plan.noise.is_some_and(heard);
-    let list = bank.each(&wanted, &|case| {
-        Ok(Control { label: case.label.clone(), trial: bench.run(case)? })
-    })?;
+    let list = bank.each(&wanted, &|case| Ok(Control { label: case.label.clone(), trial: bench.run(case)? }))?;
     let command = super::command(args, bank.range.len());
     println!("{}", markdown(&list, &command, start.elapsed().as_secs_f64()));
     let out = crate::root().join(&args.out);

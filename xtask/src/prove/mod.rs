@@ -75,9 +75,9 @@ pub struct Args {
     /// Run this binary instead of building hysid
     #[arg(long, value_name = "FILE")]
     binary: Option<PathBuf>,
-    /// Seconds that a diagnosis on one thread may take (a minute on two)
-    #[arg(long, default_value_t = 120)]
-    time_limit: u64,
+    /// Seconds that a diagnosis on one thread may take [default: 120, a minute on two; 60 with --quick]
+    #[arg(long)]
+    time_limit: Option<u64>,
     /// Where the page, the score and the labels go
     #[arg(long, value_name = "DIR", default_value = "target/prove")]
     out: PathBuf,
@@ -106,7 +106,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     };
     let start = Instant::now();
     let root = std::env::temp_dir().join(format!("hysid-prove-{}", std::process::id()));
-    let bench = Bench { binary, root: root.clone(), time_limit: Duration::from_secs(args.time_limit) };
+    let seconds = args.time_limit.unwrap_or(if args.quick { 60 } else { 120 });
+    let bench = Bench { binary, root: root.clone(), time_limit: Duration::from_secs(seconds) };
     let bank = Bank {
         stream,
         seed: args.seed,

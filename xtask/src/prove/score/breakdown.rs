@@ -108,7 +108,10 @@ pub(super) fn competitors(known: &[&Row]) -> Vec<(String, Vec<f64>)> {
         ("Linear black box".into(), medians(&|r| of(r, &|c| c.linear))),
         ("NARX (first output)".into(), medians(&|r| of(r, &|c| c.narx.0))),
         ("NARX on the residual (first output)".into(), medians(&|r| of(r, &|c| c.narx_on_residual.0))),
-        ("SINDy-like discrepancy (one mass)".into(), medians(&|r| of(r, &|c| c.sindy.map_or(f64::NAN, |e| e.min(1e9))))),
+        (
+            "SINDy-like discrepancy (one mass)".into(),
+            medians(&|r| of(r, &|c| c.sindy.map_or(f64::NAN, |e| e.min(1e9)))),
+        ),
         ("**hysid diagnose**".into(), medians(&Row::after)),
         ("Oracle: true structure, refitted".into(), medians(&|r| r.rivals.oracle)),
     ]

@@ -217,7 +217,8 @@ fn told(rows: &Rows<'_>) -> [Line; 4] {
 /// What a further experiment tells, and other inputs than the recorded ones.
 fn elsewhere(rows: &Rows<'_>) -> [Line; 3] {
     let settled: Vec<Settled> = rows.all.iter().filter_map(|r| r.settled).collect();
-    let better = |r: &&Row| Some(r.trial.after_louder? <= 0.5 * r.rivals.competitors.as_ref()?.best_black_box_louder()?);
+    let better =
+        |r: &&Row| Some(r.trial.after_louder? <= 0.5 * r.rivals.competitors.as_ref()?.best_black_box_louder()?);
     let louder: Vec<bool> = rows.known.iter().filter_map(better).collect();
     let proposed = "Proposed experiment (separation >= 25) settles the tie";
     let by_chance = "- an input drawn at random, of the same length and level";
