@@ -97,10 +97,19 @@ fn same(whole: &Expr, a: &Expr, left: Option<Unit>, b: &Expr, right: Option<Unit
         (Some(l), Some(r)) if l.clashes(&r) => {
             Err(format!("`{a}` has the unit {l} and `{b}` the unit {r} in `{whole}`"))
         }
+        (Some(l), Some(_)) => Ok(Some(l)),
         // `x + 1`: the literal takes the other's unit; an input's unit is not declared, so nothing is known for certain.
-        (Some(l), _) => Ok(Some(l)),
-        (None, right) => Ok(right),
+        (Some(one), None) => Ok(beside_unknown(one, b)),
+        (None, Some(one)) => Ok(beside_unknown(one, a)),
+        (None, None) => Ok(None),
     }
+}
+
+/// The unit of a sum of which only one side is known. An angle is a pure number with a name: a lift coefficient may hold `C_q*d(alpha)`, in radians, and is no
+/// angle for that.
+fn beside_unknown(known: Unit, other: &Expr) -> Option<Unit> {
+    let angle = !known.is_none() && !known.clashes(&Unit::none());
+    (!angle || matches!(other, Expr::Number(_))).then_some(known)
 }
 
 /// The first clash: its key and what clashes.
@@ -147,5 +156,23 @@ impl Simulation {
             with_columns.parameters.push(stand_in);
         }
         unit_of(&with_columns, expr).ok().flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_beside_what_is_unknown_is_a_number() {
+        let text = "[time]\nperiod_s = 0.1\n[inputs]\na = \"alpha_rad\"\n[parameters]\nC = { value = 6.0, unit = \"1/rad\" }\nC_q = { value = 0.1, unit = \"s\" }\n\
+                    g = { value = 2.0, unit = \"-\" }\n[outputs]\ncn = \"C*a\"\n";
+        let simulation = Simulation::parse(text, "wing.sim.toml").unwrap();
+        let unit = |e: &str| simulation.unit_of_expr(&Expr::parse(e).unwrap()).map(|u| u.to_string());
+        assert_eq!(unit("C*sin(a)*((1 + sqrt(a))/2)^2 + C_q*d(a)"), None);
+        assert_eq!(unit("C_q*d(a) - C*sin(a)/2"), None);
+        // A literal takes the unit of what it is added to, as before, and what is no angle tells what it is.
+        assert_eq!(unit("g*a + 0.1").as_deref(), Some("rad"));
+        assert_eq!(unit("d(a) + a/2").as_deref(), Some("rad/s"));
     }
 }

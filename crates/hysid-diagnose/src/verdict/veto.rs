@@ -80,9 +80,13 @@ fn told_outside_blocks<'n>(base: &Base<'_>, amplitudes: impl Iterator<Item = &'n
 mod tests {
     use super::*;
     use crate::budget::Budget;
+    use crate::mechanism::Mechanism;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
-    use crate::oscillator::normal;
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use crate::search::fitting::refit;
+    use crate::search::screen::screen;
+    use crate::slot::Slot;
     use hysid_plant::Simulation;
 
     #[test]
@@ -111,6 +115,27 @@ mod tests {
         // The third tenth is held out, the second is not.
         assert_eq!(told(120), [true, false]);
         assert_eq!(told(60), [true, true]);
+    }
+
+    #[test]
+    fn a_likelihood_that_only_the_noise_model_gains_explains_nothing() {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut random = normal(6);
+        let u = drive(600, &mut random);
+        let y = respond(&u, REAL, |x, _| 2e5 * x.powi(3));
+        let noise = 0.01 * rms(&y);
+        let y = y.iter().map(|y| y + noise * random()).collect();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let cubic = |m: &Mechanism, _: &Slot| m.id == "cubic_stiffness";
+        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &cubic);
+        let cubic = refit(&setting, &none, &found[0]).unwrap();
+        assert!(explains(&none.base, &cubic));
+        // The same effects with all that they gained, and the errors of the simulation as it is.
+        let mut idle = setting.hypothesis(Vec::new(), setting.further(&none.base, None, 1, 0).unwrap());
+        idle.base.log_likelihood = cubic.base.log_likelihood;
+        assert!(!explains(&none.base, &idle));
     }
 
     #[test]
