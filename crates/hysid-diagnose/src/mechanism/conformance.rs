@@ -44,7 +44,8 @@ specimens!(
     "shaft",
     "stage",
     "brace",
-    "bearing"
+    "bearing",
+    "stack"
 );
 
 /// A breach of the suite's laws.
@@ -218,6 +219,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.01, 4.0),
     (0.002, 20.0),
     (0.002, 4.0),
+    (0.01, 40.0),
 ];
 
 /// A bench for each specimen.

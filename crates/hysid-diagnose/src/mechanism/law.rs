@@ -19,7 +19,7 @@ pub enum Change {
     Drive(String),
     /// A rate taken from the derivative of a store.
     Outflow(String),
-    /// An expression that replaces the input, the parameter or the output of the slot.
+    /// An expression that replaces the input, the parameter, the output or the half-widths of the slot.
     Replace(String),
     /// The acceleration becomes (force - `force`)/(mass + `mass`).
     Inertia {

@@ -54,6 +54,7 @@ fn place_name(place: Place) -> &'static str {
         Place::Connection => "force between two parts",
         Place::ForceLaw => "static force law",
         Place::Loop => "loop of the simulation",
+        Place::Plays => "plays of the simulation",
         Place::Store => "store",
         Place::Sensor => "sensor",
         Place::Parameter => "parameter",

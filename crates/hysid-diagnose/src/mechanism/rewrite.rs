@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hysid_plant::{Expr, Initial, Output, Parameter, Simulation, State, Unit};
+use hysid_plant::{Expr, Initial, Memory, Output, Parameter, Simulation, State, Unit};
 
 use super::copies::{follow, renewed};
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
@@ -29,6 +29,13 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
+    /// The same for a text in which these names stand for parts of the equations that are put in later.
+    fn beside(&self, names: &[&str]) -> Self {
+        let mut own = self.own.clone();
+        own.extend(names.iter().map(|name| ((*name).to_owned(), (*name).to_owned())));
+        Self { slot: self.slot, own }
+    }
+
     fn text(&self, text: &str) -> Result<Expr, String> {
         let parsed = Expr::parse(text).map_err(|e| format!("`{text}`: {e}"))?;
         let mut unknown = None;
@@ -128,6 +135,21 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             }
             Ok(())
         }
+        (Target::HalfWidths(symbol), Change::Replace(text)) => {
+            let by = writer.beside(&["r"]).text(text)?;
+            let widened = |arguments: Vec<Expr>| match <[Expr; 2]>::try_from(arguments) {
+                Ok([w, r]) if w.uses(symbol) => vec![w, by.substitute("r", &r)],
+                Ok(others) => others.into(),
+                Err(others) => others,
+            };
+            simulation.map_equations(|e| {
+                e.map(&mut |part| match part {
+                    Expr::Memory(Memory::Play, arguments) => Expr::Memory(Memory::Play, widened(arguments)),
+                    other => other,
+                })
+            });
+            Ok(())
+        }
         (Target::Output(column), Change::Replace(text)) => {
             let by = writer.text(text)?;
             let output = simulation.output_mut(column).ok_or("the output is gone")?;
@@ -205,11 +227,7 @@ fn separation(
         return Err("the angle is no signal of its own".to_owned());
     };
     let ahead = steady.substitute(&angle, &writer.text(at)?);
-    let mut inner = Writer { slot, own: writer.own.clone() };
-    for name in ["steady", "ahead"] {
-        inner.own.insert(name.to_owned(), name.to_owned());
-    }
-    let mut by = inner.text(by)?;
+    let mut by = writer.beside(&["steady", "ahead"]).text(by)?;
     for (name, part) in [("steady", &steady), ("ahead", &ahead)] {
         by = by.substitute(name, part);
     }

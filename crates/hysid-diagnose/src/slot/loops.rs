@@ -1,6 +1,6 @@
-//! The loops that a simulation has: states beside the motions that move with the size of a velocity, as Bouc and Wen's `z`.
+//! The loops that a simulation has: states beside the motions that move with the size of a velocity, as Bouc and Wen's `z`, and plays of its inputs.
 
-use hysid_plant::{Expr, Function, Memory};
+use hysid_plant::{Expr, Function, Memory, Simulation};
 
 use super::algebra::{Factors, size};
 use super::find::Finder;
@@ -19,6 +19,20 @@ impl Finder<'_> {
     pub(super) fn loops(&self, v: &Expr) -> bool {
         let others = self.simulation.states.iter().filter(|s| !self.moves(&s.name));
         others.into_iter().any(|s| speed_of(&s.derivative, &s.name, |a| a == v).is_some())
+    }
+
+    /// A slot in the plays of each input that the simulation has: what widens them enters their half-widths.
+    pub(super) fn own_plays(&self) -> Vec<Slot> {
+        let inputs = self.simulation.inputs.iter();
+        let played = inputs.filter(|i| !half_widths(self.original, &i.symbol).is_empty());
+        let slot_of = |symbol: &str| {
+            let target = Target::HalfWidths(symbol.to_owned());
+            let mut slot = Slot::new(Place::Plays, format!("input:{symbol}"), format!("at the input {symbol}"), target);
+            slot.offer(self.simulation, "u", Expr::symbol(symbol));
+            slot.context = half_widths(self.simulation, symbol);
+            slot
+        };
+        played.map(|i| slot_of(&i.symbol)).collect()
     }
 
     fn own_loop(&self, name: &str, derivative: &Expr) -> Option<Slot> {
@@ -56,6 +70,22 @@ impl Finder<'_> {
         };
         rate || e.symbols().iter().any(moving)
     }
+}
+
+/// The half-widths of the plays of a symbol, or of what is made of it.
+fn half_widths(simulation: &Simulation, symbol: &str) -> Vec<Expr> {
+    let mut found = Vec::new();
+    for (_, equation) in simulation.expressions() {
+        equation.visit(&mut |e| {
+            if let Expr::Memory(Memory::Play, arguments) = e
+                && let [w, half_width] = arguments.as_slice()
+                && w.uses(symbol)
+            {
+                found.push(half_width.clone());
+            }
+        });
+    }
+    found
 }
 
 /// The first velocity whose size the rate of a state holds, or whose sign beside that of the state: `abs(v)`, `abs(v*z)`, `sign(v*z)`.

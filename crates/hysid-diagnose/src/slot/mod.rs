@@ -76,6 +76,8 @@ pub enum Place {
     ForceLaw,
     /// The rate of a hysteresis loop that the simulation has.
     Loop,
+    /// The half-widths of the plays of an input that the simulation has.
+    Plays,
     /// A first-order state that holds something.
     Store,
     /// The measured output, as a sensor.
@@ -100,6 +102,8 @@ pub(crate) enum Target {
     SymbolIn(String, Vec<String>, Option<Expr>),
     /// Replaces this part of the derivatives of these states.
     PartIn(Expr, Vec<String>),
+    /// Replaces the half-width of every play of this symbol; `r` stands for what it was.
+    HalfWidths(String),
 }
 
 /// A state whose derivative a force changes, and how.

@@ -123,7 +123,7 @@ mod tests {
         let mut random = normal(6);
         let u = drive(600, &mut random);
         let y = respond(&u, REAL, |x, _| 2e5 * x.powi(3));
-        let noise = 0.01 * rms(&y);
+        let noise = 0.5 * rms(&y);
         let y = y.iter().map(|y| y + noise * random()).collect();
         let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);

@@ -1,23 +1,36 @@
 //! Hysteresis of an actuator whose loop widens with the rate.
 
 use super::plays::Plays;
-use crate::mechanism::{Block, Family, Grid, Mechanism, Need, Purpose, anywhere, log_grid};
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose, anywhere, log_grid};
 use crate::slot::Place;
+
+/// A half-width of a play that grows in proportion to the rate. The rate is that of the way from the sample before: a central difference is nearly
+/// blind to what turns at every sample, and such inputs widen the loop most.
+fn widened(half_width: &str) -> String {
+    format!("{half_width}*(1 + lambda*abs(u - delay(u, h_u))/h_u)")
+}
+
+/// Plays that the simulation has widen, all of them by one share.
+fn of_own_plays() -> Law {
+    Law::replace(widened("r")).amplitude("lambda", "h/u", 0.0, 1000.0).constant("h_u", "h_u", Grid::Values(vec![1.0]))
+}
 
 /// Hysteresis of an actuator whose loop widens with the rate.
 pub static RATE_DEPENDENT_HYSTERESIS: Mechanism = Mechanism {
     id: "rate_dependent_hysteresis",
     family: Family::ActuatorHysteresis,
     block: Block::Hysteresis,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Plays],
     applies: anywhere,
-    already: &["play(u, R)", "play(u + P, R)"],
-    law: |_, purpose| {
+    already: &["play(u, R)", "play(u + P, R)", "1 + P*abs(D)", "1 + P*abs(D)/H"],
+    law: |slot, purpose| {
+        if slot.place == Place::Plays {
+            return of_own_plays();
+        }
         // Plays in series with a lag do to first order what thresholds that grow with the rate do, each play by a lag of its own where they
-        // grow in proportion; only sharp recordings tell the difference. The rate is that of the way from the sample before: a central
-        // difference is nearly blind to what turns at every sample, and such inputs widen the loop most.
+        // grow in proportion; only sharp recordings tell the difference.
         let plays = Plays::settled(purpose);
-        let wide = |r: &str| format!("play(u, {r}*(1 + lambda*abs(u - delay(u, h_u))/h_u))");
+        let wide = |r: &str| format!("play(u, {})", widened(r));
         match purpose {
             Purpose::Screening | Purpose::Refit => plays
                 .law(plays.sum(|r| format!("lag(play(u, {r}), tau)")))
@@ -33,7 +46,7 @@ pub static RATE_DEPENDENT_HYSTERESIS: Mechanism = Mechanism {
     contains: &["prandtl_ishlinskii", "backlash"],
     confusable: &["prandtl_ishlinskii", "actuator_lag", "viscoelastic"],
     needs: &[Need::Turns(12), Need::Band(4.0)],
-    sentence: "The actuator {place} has a hysteresis loop that widens with the rate: its plays carry {share} of the gain[ and lag by {tau}].",
+    sentence: "The actuator {place} has a hysteresis loop that widens with the rate[: its plays carry {share} of the gain][ and lag by {tau}][; each unit of the rate widens them by the share {lambda}].",
     signature: "The loop widens with the frequency but does not vanish at slow rates.",
     reference: "M. Al Janaideh, S. Rakheja, C.-Y. Su, An analytical generalized Prandtl-Ishlinskii model inversion, IEEE/ASME Trans. Mechatron. 16 (2011) 734-744; W. T. Ang, P. K. Khosla, C. N. Riviere (2007)",
 };
@@ -60,6 +73,25 @@ mod tests {
                 w
             })
             .collect()
+    }
+
+    #[test]
+    fn plays_that_a_simulation_has_widen_together() {
+        let text = include_str!("../specimens/stack.sim.toml");
+        let simulation = Simulation::parse(text, "stack.sim.toml").unwrap();
+        let slots = RATE_DEPENDENT_HYSTERESIS.slots(&Structure::of(&simulation));
+        let [slot] = slots.as_slice() else { panic!("{slots:?}") };
+        let input: Vec<f64> = (0..400).map(|i| 9.0 * (0.02 * f64::from(i).powf(1.3)).sin()).collect();
+        let signals = Signals::new(0.01, 0.0, BTreeMap::from([("u".to_owned(), input)]));
+        let written =
+            RATE_DEPENDENT_HYSTERESIS.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap().simulation;
+        let wide = "*(1 + lambda*abs(u - delay(u, h_u))/h_u)";
+        let y = written.outputs[0].expression.to_string();
+        for r in ["r_1", "r_2"] {
+            assert!(y.contains(&format!("play(u, {r}{wide})")), "{y}");
+        }
+        // What widens already is no candidate, and neither is a further operator beside the plays.
+        assert!(RATE_DEPENDENT_HYSTERESIS.slots(&Structure::of(&written)).is_empty());
     }
 
     #[test]
