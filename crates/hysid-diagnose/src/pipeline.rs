@@ -19,7 +19,7 @@ use crate::model::Count;
 use crate::model::base::NoiseKind;
 use crate::model::force::pushed;
 use crate::model::hold::free_run;
-use crate::model::hypothesis::{Hypothesis, Setting};
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 use crate::openset::shapes::told_limit;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
@@ -263,11 +263,17 @@ fn written<'d>(
     // Another recording sees another course of what wanders: what follows this one is worse than nothing there.
     let believed = winner > 0 && !vetoed && risk.is_none();
     let wanders = judged.wanders().filter(|_| believed);
-    let steady = if wanders.is_some() { judged.steady(pool) } else { winner };
+    let overdone = judged.overdone(pool).filter(|_| believed);
+    let steady = if wanders.is_some() || overdone.is_some() { judged.steady(pool) } else { winner };
     let set = if believed && !foreign { steady } else { 0 };
+    let written = if set > 0 { "it is not written, and the other effects are" } else { "the effects are not written" };
+    if let Some(Effect { mechanism, slot, .. }) = overdone {
+        file.notes.push(format!(
+            "{} at {slot} is as strong as its law allows, and stands for something else: {written}",
+            mechanism.id
+        ));
+    }
     if let Some(words) = wanders {
-        let written =
-            if set > 0 { "it is not written, and the other effects are" } else { "the effects are not written" };
         file.notes.push(format!("{words}: that is likelier than a change that the catalogue has, and another recording sees another course, so that {written}"));
     }
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {

@@ -62,6 +62,9 @@ const CYCLES: [f64; 5] = [1.0, 1.41, 2.0, 2.83, 4.0];
 /// Width of a gate over the distance of its knee.
 const GATE: f64 = 0.1;
 
+/// Shares of the samples below the levels between which the gain of an input may change.
+const SHIFTS: [(f64, f64); 4] = [(0.2, 0.5), (0.5, 0.8), (0.2, 0.8), (0.3, 0.7)];
+
 /// A knee, a width or a wave number as it is written: three digits, and more where they would make it one of the numbers that are part of a term's form
 /// ([`FORM`]), which no fit moves.
 fn free(x: f64) -> String {
@@ -203,12 +206,36 @@ pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
 }
 
 /// A coordinate with a coefficient that follows an input, its size or its square, as a brake in series with a motor does.
-pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 3] {
-    [
+pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
+    let mut out = vec![
         product((u, input), (name, x)),
         Shape::new(format!("{u}^2*{name}"), Kind::Odd, both(input, x, |u, x| u * u * x)),
         Shape::new(format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)),
-    ]
+    ];
+    out.extend(gears((u, input), (name, x)));
+    out
+}
+
+/// An input whose gain changes as a coordinate rises beyond one level and changes back below another, as that of a motor behind a gear that shifts.
+fn gears((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
+    let mut all: Vec<f64> = x.iter().flatten().copied().collect();
+    all.sort_by(f64::total_cmp);
+    let shifts = |(low, high): (f64, f64)| {
+        let (lower, upper) = (quantile(&all, low)?, quantile(&all, high)?);
+        let switch = |up: &mut f64, v: f64| {
+            if v > upper {
+                *up = 1.0;
+            } else if v < lower {
+                *up = -1.0;
+            }
+            *up
+        };
+        // As the operator has it: at rest it is down.
+        let gear = in_turn(x, |_| -1.0, switch);
+        let text = format!("{u}*relay({name}, {}, {})", free(lower), free(upper));
+        (upper > lower).then(|| Shape::new(text, Kind::Play, both(input, &gear, |u, gear| u * gear)))
+    };
+    SHIFTS.into_iter().filter_map(shifts).collect()
 }
 
 /// What is beyond limits on either side, at a few places.

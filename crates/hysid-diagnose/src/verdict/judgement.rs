@@ -151,13 +151,14 @@ impl<'d> Judgement<'d> {
         !self.runs_away && self.within == VerdictKind::NoSignificantMismatch && self.kind == VerdictKind::Ambiguous
     }
 
-    /// The winner without the members in the place of which something wanders, and without what else changes there in time, as a place in the pool; the
-    /// simulation as it is where the others were not fitted or explain too little.
+    /// The winner without the members in the place of which something wanders, without what else changes there in time, and without those that are
+    /// [`overdone`], as a place in the pool; the simulation as it is where the others were not fitted or explain too little.
     pub fn steady(&self, pool: &[Hypothesis<'_>]) -> usize {
         let best = &pool[self.winner];
         let wanders = |i: usize| self.wandering[i].as_ref().is_some_and(|w| w.probability > LIKELY);
+        let unsteady = |i: usize| wanders(i) || overdone(&best.base, &best.effects[i]);
         let all = 0..best.effects.len();
-        let key = best.key_of(|i| !all.clone().any(|j| wanders(j) && is_one_course(best, i, j)));
+        let key = best.key_of(|i| !all.clone().any(|j| unsteady(j) && is_one_course(best, i, j)));
         let sets: Vec<(Key, f64)> = pool.iter().map(|h| (h.key(), h.log_evidence - pool[0].log_evidence)).collect();
         place_of(&sets, &key, STEADY * sets[self.winner].1)
     }
@@ -166,6 +167,12 @@ impl<'d> Judgement<'d> {
     pub fn wanders(&self) -> Option<&str> {
         let likely = self.wandering.iter().flatten().filter(|w| w.probability > LIKELY);
         likely.max_by(|a, b| a.probability.total_cmp(&b.probability)).map(|w| w.words.as_str())
+    }
+
+    /// The first member of the winner that is [`overdone`].
+    pub fn overdone<'p>(&self, pool: &'p [Hypothesis<'_>]) -> Option<&'p Effect> {
+        let best = &pool[self.winner];
+        best.effects.iter().find(|e| overdone(&best.base, e))
     }
 
     /// The sets as they stand against each other.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::wordings::{collapses, shared, wordings};
 use super::{Claim, FIRM, Hypothesis as Weighed, probabilities};
 use crate::budget::Step;
+use crate::mechanism::Family;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, OnBlocks, Setting, block_score};
 use crate::search::compose::best_of;
@@ -164,6 +165,15 @@ pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
 /// Whether an amplitude of the effect stands at a bound: the law is stretched to what it was not made for, something else may be meant.
 pub fn stretched(base: &Base<'_>, effect: &Effect) -> bool {
     any_at_bound(base, effect.written.amplitudes.iter().map(|a| &a.name))
+}
+
+/// Whether an effect that the clock drives is as strong as its law allows: a parameter that jumps to four times its value, a disturbance beyond all forces.
+/// It stands for something else, and another recording has it at other times.
+pub fn overdone(base: &Base<'_>, effect: &Effect) -> bool {
+    let by_the_clock = matches!(effect.mechanism.family, Family::TimeVariation | Family::ExternalDisturbance);
+    let strong = effect.written.amplitudes.iter().map(|a| &a.name);
+    let strong = strong.filter(|name| base.model.place_of(name).is_some_and(|place| base.fit.theta[place] != 0.0));
+    by_the_clock && any_at_bound(base, strong)
 }
 
 fn any_at_bound<'n>(base: &Base<'_>, mut names: impl Iterator<Item = &'n String>) -> bool {
