@@ -165,8 +165,8 @@ mod tests {
 
     #[test]
     fn an_angle_beside_what_is_unknown_is_a_number() {
-        let text = "[time]\nperiod_s = 0.1\n[inputs]\na = \"alpha_rad\"\n[parameters]\nC = { value = 6.0, unit = \"1/rad\" }\nC_q = { value = 0.1, unit = \"s\" }\n\
-                    g = { value = 2.0, unit = \"-\" }\n[outputs]\ncn = \"C*a\"\n";
+        let text = "[time]\nperiod_s = 0.1\n[inputs]\na = \"alpha_rad\"\n[parameters]\nC = { value = 6.0, fixed = true, unit = \"1/rad\" }\nC_q = { value = 0.1, fixed = true, unit = \"s\" }\n\
+                    g = { value = 2.0, fixed = true, unit = \"-\" }\n[outputs]\ncn = \"C*a\"\n";
         let simulation = Simulation::parse(text, "wing.sim.toml").unwrap();
         let unit = |e: &str| simulation.unit_of_expr(&Expr::parse(e).unwrap()).map(|u| u.to_string());
         assert_eq!(unit("C*sin(a)*((1 + sqrt(a))/2)^2 + C_q*d(a)"), None);

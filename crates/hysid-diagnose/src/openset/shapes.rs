@@ -337,6 +337,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_gain_shifts_up_at_one_level_and_down_at_another() {
+        let up_and_down: Vec<f64> = (0..=100).chain((0..100).rev()).map(f64::from).collect();
+        let input = vec![vec![2.0; up_and_down.len()]];
+        let gear = gears(("u", &input), ("w", &[up_and_down])).swap_remove(2);
+        assert_eq!(gear.text, "u*relay(w, 20, 80)");
+        let high: Vec<usize> = (0..201).filter(|&n| gear.series[0][n] > 0.0).collect();
+        assert!(high.iter().copied().eq(81..=180) && gear.series[0].iter().all(|g| g.abs() == 2.0), "{high:?}");
+        // What stands still shifts nothing.
+        assert!(gears(("u", &input), ("w", &[vec![1.0; 201]])).is_empty());
+    }
+
+    #[test]
     fn a_limit_is_told_as_it_is_written() {
         let rate = vec![(0..100).map(f64::from).collect::<Vec<_>>()];
         let texts: Vec<String> = limits(("rate_fin", &rate)).into_iter().map(|s| s.text).collect();

@@ -267,7 +267,34 @@ pub fn log_weights(
 
 #[cfg(test)]
 mod tests {
+    use hysid_plant::Simulation;
+
     use super::*;
+    use crate::budget::Budget;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::calibrated;
+    use crate::openset::varying::tests::{BASELINE, recorded};
+    use crate::request::{Hooks, Options};
+    use crate::search::Search;
+
+    #[test]
+    fn a_change_to_the_end_of_what_its_law_allows_is_overdone() {
+        let data = recorded(6, |t| if t > 6.0 { 1.3 } else { 1.0 }, 0.02);
+        let budget = Budget::new(&|_| false);
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
+        let search = Search::new(setting, Options::default(), &hooks);
+        let Hypothesis { mut base, effects, .. } =
+            search.answer(&none, &vec![("abrupt_change".to_owned(), "parameter:k".to_owned())]).unwrap();
+        let place = base.model.place_of(&effects[0].written.amplitudes[0].name).unwrap();
+        assert!(base.fit.theta[place] > 0.0 && !overdone(&base, &effects[0]));
+        base.fit.at_bound[place] = true;
+        assert!(overdone(&base, &effects[0]));
+        // At zero the law does nothing, which is no strength.
+        base.fit.theta[place] = 0.0;
+        assert!(!overdone(&base, &effects[0]));
+    }
 
     #[test]
     fn what_is_told_first_is_not_outweighed_by_the_alternatives() {
