@@ -29,10 +29,10 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// The same for a text in which these names stand for parts of the equations that are put in later.
+    /// The same for a text in which these names stand for parts of the equations that are put in later, written `?name`: no symbol of a user's is so called.
     fn beside(&self, names: &[&str]) -> Self {
         let mut own = self.own.clone();
-        own.extend(names.iter().map(|name| ((*name).to_owned(), (*name).to_owned())));
+        own.extend(names.iter().map(|name| ((*name).to_owned(), format!("?{name}"))));
         Self { slot: self.slot, own }
     }
 
@@ -138,7 +138,7 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
         (Target::HalfWidths(symbol), Change::Replace(text)) => {
             let by = writer.beside(&["r"]).text(text)?;
             let widened = |arguments: Vec<Expr>| match <[Expr; 2]>::try_from(arguments) {
-                Ok([w, r]) if w.uses(symbol) => vec![w, by.substitute("r", &r)],
+                Ok([w, r]) if w.uses(symbol) => vec![w, by.substitute("?r", &r)],
                 Ok(others) => others.into(),
                 Err(others) => others,
             };
@@ -228,7 +228,7 @@ fn separation(
     };
     let ahead = steady.substitute(&angle, &writer.text(at)?);
     let mut by = writer.beside(&["steady", "ahead"]).text(by)?;
-    for (name, part) in [("steady", &steady), ("ahead", &ahead)] {
+    for (name, part) in [("?steady", &steady), ("?ahead", &ahead)] {
         by = by.substitute(name, part);
     }
     // What was put in is not looked through again: it holds the function that it stands for.

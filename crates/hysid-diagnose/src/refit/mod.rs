@@ -2,5 +2,7 @@
 
 mod lm;
 mod normal;
+mod options;
 
-pub use lm::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};
+pub use lm::{Fit, Problem, go_on, levenberg_marquardt};
+pub use options::LmOptions;

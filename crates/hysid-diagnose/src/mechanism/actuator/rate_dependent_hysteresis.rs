@@ -90,6 +90,13 @@ mod tests {
         for r in ["r_1", "r_2"] {
             assert!(y.contains(&format!("play(u, {r}{wide})")), "{y}");
         }
+        // An input may be called as a half-width is in the law's text.
+        let renamed = text.replace("u = \"u_V\"", "r = \"u_V\"").replace("g*u", "g*r").replace("play(u,", "play(r,");
+        let other = Simulation::parse(&renamed, "stack.sim.toml").unwrap();
+        let there = RATE_DEPENDENT_HYSTERESIS.slots(&Structure::of(&other)).swap_remove(0);
+        let of_other = RATE_DEPENDENT_HYSTERESIS.rewrite(&other, &there, &signals, Purpose::Refit).unwrap().simulation;
+        let same = y.replace("*u ", "*r ").replace("(u", "(r").replace("abs(u", "abs(r");
+        assert_eq!(of_other.outputs[0].expression.to_string(), same);
         // What widens already is no candidate, and neither is a further operator beside the plays.
         assert!(RATE_DEPENDENT_HYSTERESIS.slots(&Structure::of(&written)).is_empty());
     }
