@@ -31,6 +31,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, ensure};
 use hysid_concealed::bank;
 use hysid_concealed::case::{Case, Wanted};
+use hysid_concealed::noise::Noise;
 use hysid_concealed::seed::Stream;
 use score::{Row, Score};
 use trial::Bench;
@@ -63,8 +64,8 @@ pub struct Args {
     /// Only the controls among the cases, where nothing is missing: false alarms in all and for each kind of noise; docs/proof.md is left alone
     #[arg(long, conflicts_with_all = ["quick", "write"])]
     controls: bool,
-    /// Of the controls only those under this kind of noise, such as process
-    #[arg(long, value_name = "KIND", requires = "controls")]
+    /// Of the controls only those under this kind of noise
+    #[arg(long, value_name = "KIND", requires = "controls", value_parser = Noise::ALL.map(Noise::name))]
     noise: Option<String>,
     /// Print how often statements of a given probability are right, and write them to statements.csv, for `cargo xtask reliability`
     #[arg(long, requires = "development")]

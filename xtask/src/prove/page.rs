@@ -180,7 +180,7 @@ pub fn cases(rows: &[Row]) -> String {
         };
         let _ = writeln!(
             text,
-            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} seen={:.0} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} own={:?}/{:?} sep={:?} {:.1}s{}",
+            "{mark} {} {:?} {:?} {:?} N={} dnr={:.2} seen={:.0} {} {:.1}% truth=[{}] said={said} before={:.3} after={:.3} oracle={:.3} linear={:.3} own={:?}/{:?} sep={:?} {:.1}s{}",
             r.label.id,
             r.label.group,
             r.label.plant,
@@ -194,6 +194,7 @@ pub fn cases(rows: &[Row]) -> String {
             r.rivals.before,
             r.after(),
             r.rivals.oracle,
+            r.rivals.competitor(|c| c.linear),
             own.map(|f| (f.1 / f.0).sqrt()),
             r.verdict().and_then(|v| v.own_black_box),
             r.rivals.separation,

@@ -37,6 +37,13 @@ pub struct Rivals {
     pub competitors: Option<Competitors>,
 }
 
+impl Rivals {
+    /// An error of a competitor; not a number where none was run.
+    pub fn competitor(&self, error: impl Fn(&Competitors) -> f64) -> f64 {
+        self.competitors.as_ref().map_or(f64::NAN, error)
+    }
+}
+
 /// Errors of models that know nothing of the catalogue.
 #[derive(Debug, Clone)]
 pub struct Competitors {

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use hysid_plant::{Expr, Initial, Memory, Output, Parameter, Simulation, State, Unit};
+use hysid_plant::{Expr, Initial, Output, Parameter, Simulation, State, Unit};
 
 use super::copies::{follow, renewed};
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
 use super::{Change, Law, Mechanism, Purpose, Role, Start};
-use crate::slot::{ForcePath, Pull, Slot, Target, force_path};
+use crate::slot::{ForcePath, Pull, Slot, Target, force_path, play_of};
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -137,17 +137,8 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
         }
         (Target::HalfWidths(symbol), Change::Replace(text)) => {
             let by = writer.beside(&["r"]).text(text)?;
-            let widened = |arguments: Vec<Expr>| match <[Expr; 2]>::try_from(arguments) {
-                Ok([w, r]) if w.uses(symbol) => vec![w, by.substitute("?r", &r)],
-                Ok(others) => others.into(),
-                Err(others) => others,
-            };
-            simulation.map_equations(|e| {
-                e.map(&mut |part| match part {
-                    Expr::Memory(Memory::Play, arguments) => Expr::Memory(Memory::Play, widened(arguments)),
-                    other => other,
-                })
-            });
+            let widened = |(w, r): (&Expr, &Expr)| w.clone().play(by.substitute("?r", r));
+            simulation.map_equations(|e| e.map(&mut |part| play_of(&part, symbol).map(widened).unwrap_or(part)));
             Ok(())
         }
         (Target::Output(column), Change::Replace(text)) => {

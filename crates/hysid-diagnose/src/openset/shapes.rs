@@ -101,10 +101,16 @@ fn in_turn<S>(x: &[Vec<f64>], start: impl Fn(f64) -> S, next: impl Fn(&mut S, f6
     x.iter().map(stretch).collect()
 }
 
+/// A function of all samples, in order of size.
+fn sorted(x: &[Vec<f64>], f: impl Fn(f64) -> f64) -> Vec<f64> {
+    let mut all: Vec<f64> = x.iter().flatten().map(|v| f(*v)).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
 /// Quantiles of a coordinate's size.
 fn quantiles<const N: usize>(x: &[Vec<f64>], at: [f64; N]) -> [f64; N] {
-    let mut size: Vec<f64> = x.iter().flatten().map(|v| v.abs()).collect();
-    size.sort_by(f64::total_cmp);
+    let size = sorted(x, f64::abs);
     at.map(|q| quantile(&size, q).unwrap_or(0.0))
 }
 
@@ -150,17 +156,23 @@ fn widths(x: &[Vec<f64>]) -> impl Iterator<Item = f64> {
 /// Relays of a coordinate of the plant: a force that switches. No sensor does.
 pub fn relays(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
     let of = |r: f64| {
-        let switch = |up: &mut f64, v: f64| {
-            if v.abs() > r {
-                *up = v.signum();
-            }
-            *up
-        };
         let n = free(r);
-        // As the operator has it: at rest it is down.
-        Shape::new(format!("relay({name}, -{n}, {n})"), Kind::Play, in_turn(x, |_| -1.0, switch))
+        Shape::new(format!("relay({name}, -{n}, {n})"), Kind::Play, switched(x, -r, r))
     };
     widths(x).map(of).collect()
+}
+
+/// A relay of a coordinate, as the operator has it: at rest it is down.
+fn switched(x: &[Vec<f64>], lower: f64, upper: f64) -> Series {
+    let switch = |up: &mut f64, v: f64| {
+        if v > upper {
+            *up = 1.0;
+        } else if v < lower {
+            *up = -1.0;
+        }
+        *up
+    };
+    in_turn(x, |_| -1.0, switch)
 }
 
 /// What first-order lags of a coordinate leave of it: time constants of the length of the recording.
@@ -206,34 +218,22 @@ pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
 }
 
 /// A coordinate with a coefficient that follows an input, its size or its square, as a brake in series with a motor does.
-pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
-    let mut out = vec![
+pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 3] {
+    [
         product((u, input), (name, x)),
         Shape::new(format!("{u}^2*{name}"), Kind::Odd, both(input, x, |u, x| u * u * x)),
         Shape::new(format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)),
-    ];
-    out.extend(gears((u, input), (name, x)));
-    out
+    ]
 }
 
 /// An input whose gain changes as a coordinate rises beyond one level and changes back below another, as that of a motor behind a gear that shifts.
-fn gears((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
-    let mut all: Vec<f64> = x.iter().flatten().copied().collect();
-    all.sort_by(f64::total_cmp);
+pub fn gears((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
+    let all = sorted(x, |v| v);
     let shifts = |(low, high): (f64, f64)| {
         let (lower, upper) = (quantile(&all, low)?, quantile(&all, high)?);
-        let switch = |up: &mut f64, v: f64| {
-            if v > upper {
-                *up = 1.0;
-            } else if v < lower {
-                *up = -1.0;
-            }
-            *up
-        };
-        // As the operator has it: at rest it is down.
-        let gear = in_turn(x, |_| -1.0, switch);
         let text = format!("{u}*relay({name}, {}, {})", free(lower), free(upper));
-        (upper > lower).then(|| Shape::new(text, Kind::Play, both(input, &gear, |u, gear| u * gear)))
+        let of_gear = || both(input, &switched(x, lower, upper), |u, gear| u * gear);
+        (upper > lower).then(|| Shape::new(text, Kind::Play, of_gear()))
     };
     SHIFTS.into_iter().filter_map(shifts).collect()
 }

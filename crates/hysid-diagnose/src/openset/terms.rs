@@ -110,6 +110,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             }
             for (u, input) in &inputs {
                 found.extend(shapes::driven((u, input), (name, x)));
+                found.extend(shapes::gears((u, input), (name, x)));
             }
         }
         if let ([a, b], [x, v], true) = (&site.own[..], &series[..own], plant) {

@@ -72,18 +72,22 @@ impl Finder<'_> {
     }
 }
 
-/// The half-widths of the plays of a symbol, or of what is made of it.
+/// What is played and the half-width, where an expression is a play of a symbol or of what is made of it.
+pub(crate) fn play_of<'e>(e: &'e Expr, symbol: &str) -> Option<(&'e Expr, &'e Expr)> {
+    match e {
+        Expr::Memory(Memory::Play, arguments) => match arguments.as_slice() {
+            [w, half_width] if w.uses(symbol) => Some((w, half_width)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// The half-widths of the plays of a symbol.
 fn half_widths(simulation: &Simulation, symbol: &str) -> Vec<Expr> {
     let mut found = Vec::new();
     for (_, equation) in simulation.expressions() {
-        equation.visit(&mut |e| {
-            if let Expr::Memory(Memory::Play, arguments) = e
-                && let [w, half_width] = arguments.as_slice()
-                && w.uses(symbol)
-            {
-                found.push(half_width.clone());
-            }
-        });
+        equation.visit(&mut |e| found.extend(play_of(e, symbol).map(|(_, half_width)| half_width.clone())));
     }
     found
 }

@@ -32,6 +32,7 @@ use hysid_plant::{Expr, Function, Simulation, Unit};
 pub use find::Structure;
 
 pub(crate) use balance::with_balances;
+pub(crate) use loops::play_of;
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
 pub(crate) use turn::{is_turn, with_turns, with_used_turns};

@@ -171,9 +171,8 @@ pub fn stretched(base: &Base<'_>, effect: &Effect) -> bool {
 /// It stands for something else, and another recording has it at other times.
 pub fn overdone(base: &Base<'_>, effect: &Effect) -> bool {
     let by_the_clock = matches!(effect.mechanism.family, Family::TimeVariation | Family::ExternalDisturbance);
-    let strong = effect.written.amplitudes.iter().map(|a| &a.name);
-    let strong = strong.filter(|name| base.model.place_of(name).is_some_and(|place| base.fit.theta[place] != 0.0));
-    by_the_clock && any_at_bound(base, strong)
+    let mut places = effect.written.amplitudes.iter().filter_map(|a| base.model.place_of(&a.name));
+    by_the_clock && places.any(|place| base.fit.at_bound[place] && base.fit.theta[place] != 0.0)
 }
 
 fn any_at_bound<'n>(base: &Base<'_>, mut names: impl Iterator<Item = &'n String>) -> bool {

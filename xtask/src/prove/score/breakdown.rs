@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use hysid_concealed::case::Group;
 
-use super::super::rivals::Competitors;
 use super::super::stats::quantile;
 use super::super::verdict::Verdict;
 use super::CELLS;
@@ -89,7 +88,6 @@ pub(super) fn competitors(known: &[&Row]) -> Vec<(String, Vec<f64>)> {
     if known.iter().all(|r| r.rivals.competitors.is_none()) {
         return Vec::new();
     }
-    let of = |r: &Row, error: &dyn Fn(&Competitors) -> f64| r.rivals.competitors.as_ref().map_or(f64::NAN, error);
     let medians = |error: &dyn Fn(&Row) -> f64| -> Vec<f64> {
         [(0.0, 0.4), (0.4, 0.7), (0.7, 2.0), (2.0, f64::INFINITY)]
             .iter()
@@ -105,12 +103,12 @@ pub(super) fn competitors(known: &[&Row]) -> Vec<(String, Vec<f64>)> {
     };
     vec![
         ("Recalibration only".into(), medians(&|r| r.rivals.before)),
-        ("Linear black box".into(), medians(&|r| of(r, &|c| c.linear))),
-        ("NARX (first output)".into(), medians(&|r| of(r, &|c| c.narx.0))),
-        ("NARX on the residual (first output)".into(), medians(&|r| of(r, &|c| c.narx_on_residual.0))),
+        ("Linear black box".into(), medians(&|r| r.rivals.competitor(|c| c.linear))),
+        ("NARX (first output)".into(), medians(&|r| r.rivals.competitor(|c| c.narx.0))),
+        ("NARX on the residual (first output)".into(), medians(&|r| r.rivals.competitor(|c| c.narx_on_residual.0))),
         (
             "SINDy-like discrepancy (one mass)".into(),
-            medians(&|r| of(r, &|c| c.sindy.map_or(f64::NAN, |e| e.min(1e9)))),
+            medians(&|r| r.rivals.competitor(|c| c.sindy.map_or(f64::NAN, |e| e.min(1e9)))),
         ),
         ("**hysid diagnose**".into(), medians(&Row::after)),
         ("Oracle: true structure, refitted".into(), medians(&|r| r.rivals.oracle)),
