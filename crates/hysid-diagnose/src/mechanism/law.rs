@@ -107,6 +107,18 @@ pub struct Derived {
     pub value: String,
 }
 
+/// What the amplitudes of a law's screening form are to each other, which decides what is fitted first: see
+/// [`Mechanism::fitted_first`](super::Mechanism::fitted_first).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Amplitudes {
+    /// Parts of one law.
+    Together,
+    /// What it does above and what it does below.
+    OfTwoSides,
+    /// Laws of one name, each a form of its own with this amplitude: the columns are screened one by one.
+    Apart,
+}
+
 /// A law at one slot: see the module.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Law {
@@ -122,8 +134,8 @@ pub struct Law {
     pub never_baseline: bool,
     /// It is the sum of two other mechanisms of the catalogue: alone it says no more than they do together.
     pub sum_of_others: bool,
-    /// Its first two amplitudes are what it does above and below: see [`Mechanism::fitted_first`](super::Mechanism::fitted_first).
-    pub of_two_sides: bool,
+    /// What its amplitudes are to each other.
+    pub amplitudes: Amplitudes,
 }
 
 impl Law {
@@ -135,7 +147,7 @@ impl Law {
             derived: Vec::new(),
             never_baseline: false,
             sum_of_others: false,
-            of_two_sides: false,
+            amplitudes: Amplitudes::Together,
         }
     }
 
@@ -269,10 +281,10 @@ impl Law {
         self.last(|p| p.searched = true)
     }
 
-    /// Its first two amplitudes are what it does above and below.
+    /// What its amplitudes are to each other.
     #[must_use]
-    pub fn of_two_sides(mut self) -> Self {
-        self.of_two_sides = true;
+    pub fn with_amplitudes(mut self, amplitudes: Amplitudes) -> Self {
+        self.amplitudes = amplitudes;
         self
     }
 

@@ -1,6 +1,6 @@
 //! A signal that goes no further than a limit: the law that actuators and sensors share.
 
-use super::{Form, Grid, Law, Purpose};
+use super::{Amplitudes, Form, Grid, Law, Purpose};
 
 /// A limit of a signal alike on both sides, at one of these quantiles at first, or on one side only: a valve has one stop, and of a converter's ends one
 /// may be within reach. A lower limit is counted as far below the median of the signal, `s_o`, as an upper one stands above it: a temperature or a
@@ -15,7 +15,7 @@ pub(super) fn limited(signal: &'static str, quantiles: &[f64], purpose: Purpose)
                 .weights(&["a_p", "a_n"])
                 .shape("s", signal, above())
                 .searched()
-                .of_two_sides(),
+                .with_amplitudes(Amplitudes::OfTwoSides),
         ),
         Purpose::Form(Form::Other) => at(format!("min({signal}, s)"), above()).silent().report("s_p", signal, "s"),
         Purpose::Form(Form::Few) => {

@@ -52,7 +52,7 @@ pub use family::{Block, Family};
 pub use form::{Form, Purpose};
 pub use grid::Grid;
 pub(crate) use grid::{log_grid, log_steps};
-pub use law::{Change, Derived, Law, LawParameter, LawState, Role, Start};
+pub use law::{Amplitudes, Change, Derived, Law, LawParameter, LawState, Role, Start};
 pub use page::catalogue_page;
 pub use rewrite::RewriteError;
 pub use rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
@@ -148,10 +148,15 @@ impl Mechanism {
     }
 
     /// What it is fitted as at first, where these are the amplitudes of its screening form that explain a residual best: a law of two sides of which one
-    /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below).
+    /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below); of laws that are screened one by one the form with this amplitude.
     pub(crate) fn fitted_first(&self, slot: &Slot, amplitudes: &[(String, f64)]) -> Purpose {
-        match amplitudes {
-            [(_, above), (_, below)] if self.law_at(slot, Purpose::Screening).of_two_sides => {
+        match (self.law_at(slot, Purpose::Screening).amplitudes, amplitudes) {
+            (Amplitudes::Apart, [(name, _)]) => {
+                let amplitude = |p: &&LawParameter| p.role == Role::Amplitude;
+                let has_it = |law: &Law| law.parameters.iter().filter(amplitude).map(|p| &p.name).eq([name]);
+                self.forms(slot).into_iter().find(|(_, law)| has_it(law)).map_or(Purpose::Refit, |(form, _)| form)
+            }
+            (Amplitudes::OfTwoSides, [(_, above), (_, below)]) => {
                 let idle = |this: &f64, other: &f64| this.abs() < IDLE * other.abs();
                 if idle(below, above) {
                     Purpose::Form(Form::Other)

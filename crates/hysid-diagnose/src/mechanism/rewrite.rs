@@ -7,7 +7,7 @@ use hysid_plant::{Expr, Initial, Output, Parameter, Simulation, State, Unit};
 use super::copies::{follow, renewed};
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
-use super::{Change, Law, Mechanism, Purpose, Role, Start};
+use super::{Amplitudes, Change, Law, Mechanism, Purpose, Role, Start};
 use crate::slot::{ForcePath, Pull, Slot, Target, force_path, play_of};
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
@@ -375,6 +375,7 @@ fn write_law(
         amplitudes,
         shapes,
         neutral,
+        apart: law.amplitudes == Amplitudes::Apart,
         linear,
         report,
         states,

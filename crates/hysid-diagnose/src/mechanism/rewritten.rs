@@ -95,6 +95,8 @@ pub struct Rewritten {
     pub shapes: Vec<Shape>,
     /// Values at which the simulation is the baseline; empty where no finite value is.
     pub neutral: Vec<(String, f64)>,
+    /// Whether each amplitude is a law of its own.
+    pub apart: bool,
     /// Whether the equations are linear in the amplitudes.
     pub linear: bool,
     /// What is reported.

@@ -36,6 +36,7 @@ pub fn artefact<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>) -> Option<Hypo
                 amplitudes: Vec::new(),
                 shapes: Vec::new(),
                 neutral: Vec::new(),
+                apart: false,
                 linear: false,
                 report: Vec::new(),
                 states: Vec::new(),

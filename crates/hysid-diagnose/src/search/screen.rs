@@ -227,22 +227,25 @@ fn features(
     let together = starts.chunks(TOGETHER).flat_map(|some| model.tangents_with(&theta, &places, some));
     for (i, (shapes, tangents)) in starts.iter().zip(together).enumerate() {
         let Some((_, columns)) = tangents else { continue };
-        let Some(group) = FeatureGroup::new(&columns, &data.layout, &base.whitener, own) else { continue };
-        let amplitudes =
-            screening.amplitudes.iter().map(|a| a.name.clone()).zip(group.amplitudes(r, columns.len())).collect();
-        let score = score(total, group.explained(r), r.len(), group.columns.len());
         // The test asks what surrogates do at the same points.
         let any = shapes.iter().all(|(n, v)| !screening.shapes.iter().any(|s| s.name == *n && s.pointed.contains(v)));
-        let (concealment, norm) = (group.concealment, group.norm);
-        points.push(Point {
-            shapes: shapes.clone(),
-            group: (any && i % every == every / 2).then(|| group.clone()),
-            joint: Some(group),
-            concealment,
-            norm,
-            amplitudes,
-            score,
-        });
+        let each = if screening.apart { 1 } else { columns.len().max(1) };
+        for (columns, amplitudes) in columns.chunks(each).zip(screening.amplitudes.chunks(each)) {
+            let Some(group) = FeatureGroup::new(columns, &data.layout, &base.whitener, own) else { continue };
+            let amplitudes =
+                amplitudes.iter().map(|a| a.name.clone()).zip(group.amplitudes(r, columns.len())).collect();
+            let score = score(total, group.explained(r), r.len(), group.columns.len());
+            let (concealment, norm) = (group.concealment, group.norm);
+            points.push(Point {
+                shapes: shapes.clone(),
+                group: (any && i % every == every / 2).then(|| group.clone()),
+                joint: Some(group),
+                concealment,
+                norm,
+                amplitudes,
+                score,
+            });
+        }
     }
     (!points.is_empty()).then_some(points)
 }

@@ -5,7 +5,7 @@ use hysid_signal::{Channel, Clock, Recording};
 use rand::RngExt;
 
 use super::Breach;
-use crate::mechanism::{Mechanism, Purpose, Rewritten, Signals, Stretch, survey};
+use crate::mechanism::{Amplitudes, Mechanism, Purpose, Rewritten, Signals, Stretch, survey};
 use crate::slot::{Slot, Structure};
 
 /// Samples of the specimens' recordings.
@@ -166,7 +166,7 @@ impl Bench {
                 }
             }
             if purpose == Purpose::Screening {
-                let of_two_sides = mechanism.law_at(slot, purpose).of_two_sides;
+                let of_two_sides = mechanism.law_at(slot, purpose).amplitudes == Amplitudes::OfTwoSides;
                 for what in self.dead_amplitudes(&written, of_two_sides) {
                     breach(what);
                 }

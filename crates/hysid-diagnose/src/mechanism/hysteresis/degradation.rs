@@ -1,6 +1,6 @@
 //! A hysteretic spring that weakens with the energy it has dissipated.
 
-use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
+use crate::mechanism::{Amplitudes, Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
 /// A hysteretic spring that weakens with the energy it has dissipated.
@@ -26,7 +26,7 @@ pub static DEGRADATION: Mechanism = Mechanism {
             .detail(purpose, "d_eta", "x/(v*T)", vec![0.0, 0.5], (0.0, 20.0))
             .detail(purpose, "b", "1", vec![0.5], (0.3, 5.0))
             .relaxing("z", "max(1 - d_A*e, 0.05)*v - (1 + d_nu*e)*(b*abs(v)*z + (1 - b)*v*abs(z))", "(1 + d_eta*e)*x_y")
-            .state("e", "1", "max(z*v, 0)/x_y")
+            .state("e", "1", "z*v/x_y")
             .report("k_h", "F/x", "F_h/x_y")
     },
     contains: &["bouc_wen", "dahl_friction"],
@@ -44,11 +44,35 @@ fn of_the_loop(purpose: Purpose) -> Law {
     let law = match purpose {
         Purpose::Form(Form::Other) => measured(Law::force("d_eta*e/(1 + d_eta*e)*rate"), "d_eta"),
         Purpose::Form(Form::Few) => measured(Law::force("-d_nu*e*(rate - drive)"), "d_nu"),
+        Purpose::Screening => {
+            let parts =
+                Law::force("d_A*e*drive - d_nu*e*(rate - drive) + d_eta*e*rate").with_amplitudes(Amplitudes::Apart);
+            ["d_A", "d_nu", "d_eta"].into_iter().fold(parts, measured)
+        }
         Purpose::Form(Form::Finer) => {
             let worn = "((1 - min(d_A*e, 0.95))*drive + (1 + d_nu*e)*(rate - drive))/(1 + d_eta*e)";
             ["d_A", "d_nu", "d_eta"].into_iter().fold(Law::force(format!("rate - {worn}")), measured)
         }
         _ => measured(Law::force("min(d_A*e, 0.95)*drive"), "d_A"),
     };
-    law.state("e", "z*v*T", "max(z*v, 0)")
+    law.state("e", "z*v*T", "z*v")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanism::conformance::specimens;
+    use crate::slot::Structure;
+
+    #[test]
+    fn of_the_ways_in_which_a_loop_wears_the_one_that_explains_most_is_fitted_first() {
+        let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
+        let slots = structures.iter().flat_map(|s| DEGRADATION.slots(s));
+        let slot = slots.into_iter().find(|s| s.place == Place::Loop).unwrap();
+        for name in ["d_A", "d_nu", "d_eta"] {
+            let first = DEGRADATION.law_at(&slot, DEGRADATION.fitted_first(&slot, &[(name.to_owned(), 1.0)]));
+            let names: Vec<&str> = first.parameters.iter().map(|p| p.name.as_str()).collect();
+            assert_eq!(names, [name]);
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! An input that does nothing while it is small.
 
-use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere, log_steps};
+use crate::mechanism::{Amplitudes, Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere, log_steps};
 use crate::slot::Place;
 
 /// An input that does nothing while it is small.
@@ -19,7 +19,7 @@ pub static DEAD_ZONE: Mechanism = Mechanism {
             Purpose::Screening => Law::replace("u - w_p*max(min(u, d_z), 0) - w_n*min(max(u, -d_z), 0)")
                 .weights(&["w_p", "w_n"])
                 .shape("d_z", "u", width)
-                .of_two_sides(),
+                .with_amplitudes(Amplitudes::OfTwoSides),
             // A spool that overlaps on one side, or more on one than on the other.
             Purpose::Form(Form::Other) => held("u - max(min(u, d_z), 0)"),
             Purpose::Form(Form::Few) => held("u - min(max(u, -d_z), 0)"),
