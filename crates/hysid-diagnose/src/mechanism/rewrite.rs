@@ -246,11 +246,17 @@ impl Mechanism {
         purpose: Purpose,
     ) -> Result<Rewritten, RewriteError> {
         let law = self.law_at(slot, purpose);
-        write_law(simulation, slot, signals, &law, purpose).map_err(|reason| RewriteError {
+        let mut written = write_law(simulation, slot, signals, &law, purpose).map_err(|reason| RewriteError {
             mechanism: self.id,
             slot: slot.label.clone(),
             reason,
-        })
+        })?;
+        // What takes the place of another leaves nothing of it, whatever the user took for its least value.
+        let own = self.stands_for(slot).filter(|_| purpose != Purpose::Screening);
+        if let Some(least) = own.and_then(|own| written.simulation.parameter_mut(own)).and_then(|p| p.min.as_mut()) {
+            *least = least.min(0.0);
+        }
+        Ok(written)
     }
 }
 

@@ -350,6 +350,15 @@ fn a_law_can_take_the_place_of_what_it_contains() {
     let name = own("Servo").unwrap();
     assert!(servo.parameter(&name).is_some(), "{name}");
     assert_eq!(own("Oscillator"), None);
+    // The user may have thought that there is some dry friction at least: of what gives way to bristles nothing need be left.
+    let mut bounded = servo;
+    bounded.parameter_mut(&name).unwrap().min = Some(0.01);
+    let slot = dahl.slots(&Structure::of(&bounded)).remove(0);
+    let signals = example_signals(&bounded, &slot);
+    for (purpose, least) in [(Purpose::Screening, 0.01), (Purpose::Refit, 0.0)] {
+        let written = dahl.rewrite(&bounded, &slot, &signals, purpose).unwrap();
+        assert_eq!(written.simulation.parameter(&name).unwrap().min, Some(least));
+    }
 }
 
 /// Nothing drives or brakes this rotor: the law in each of its forms keeps its energy, which no wrong force beside the mass does.

@@ -3,6 +3,10 @@
 use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
 use crate::slot::Place;
 
+/// Damping ratio beyond which there is no resonance to speak of, which would be one and a third times its static gain: a broad one beside a first-order
+/// plant imitates whatever is slow.
+const BROADEST: f64 = 0.4;
+
 /// A resonance that the simulation lacks.
 pub static UNMODELLED_MODE: Mechanism = Mechanism {
     id: "unmodelled_mode",
@@ -23,7 +27,7 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
                 .amplitude("m_a", slot.mass_measure(), 0.0, 5.0)
                 .shape("f_a", "1/t", frequencies)
                 .shape("zeta_a", "1", dampings)
-                .within(0.001, 0.7);
+                .within(0.001, BROADEST);
             return if slot.has("x") {
                 law.state("x_a", "x", "v_a").starting_like("x").state("v_a", "x/t", acceleration).starting_like("v")
             } else {
@@ -40,7 +44,7 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
         for i in 1..=slot.inputs() {
             law = law.amplitude(format!("b_{i}"), format!("y/u_{i}"), -3.0, 3.0);
         }
-        law.shape("f_a", "1/t", frequencies).shape("zeta_a", "1", dampings).within(0.001, 0.7)
+        law.shape("f_a", "1/t", frequencies).shape("zeta_a", "1", dampings).within(0.001, BROADEST)
     },
     contains: &[],
     confusable: &["delay", "viscoelastic", "periodic_disturbance"],
