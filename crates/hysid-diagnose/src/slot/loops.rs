@@ -68,7 +68,16 @@ impl Finder<'_> {
             self.motions.iter().any(|m| m.v == *s)
                 || (self.simulation.input(s).is_some() && self.kinematic_input(s) == Kinematic::Velocity)
         };
-        rate || e.symbols().iter().any(moving)
+        rate || e.symbols().iter().any(moving) || self.is_rate_of_a_state(e)
+    }
+
+    /// Whether an expression is the derivative of a state but for a constant: `u - w` where `w` follows `u` with a lag.
+    fn is_rate_of_a_state(&self, e: &Expr) -> bool {
+        let varies = |f: &Expr| f.symbols().iter().any(|s| self.simulation.parameter(s).is_none());
+        self.simulation.states.iter().any(|s| {
+            let mut varying = Factors::of(s.derivative.clone()).above.into_iter().filter(varies);
+            varying.next().is_some_and(|f| f == *e) && varying.next().is_none()
+        })
     }
 }
 
@@ -130,5 +139,13 @@ mod tests {
         check("k*w2 - c*z2", None);
         check("k*w2 - c*sign(w2)", None);
         check("k*w2 - c*abs(z2)*z2", None);
+    }
+
+    #[test]
+    fn a_loop_may_follow_the_rate_of_what_lags() {
+        let found =
+            slots_of(Place::Loop, &[("w2", "(u - w2)/J", "V"), ("z2", "(u - w2)/J*k - c*abs((u - w2)/J)*z2", "-")]);
+        let velocity = found.first().map(|s| s.quantity("v").unwrap().expression.to_string());
+        assert_eq!(velocity.as_deref(), Some("u - w2"));
     }
 }

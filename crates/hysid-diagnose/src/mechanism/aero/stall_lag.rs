@@ -1,6 +1,6 @@
 //! Flow separation that lags behind the angle of attack.
 
-use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
+use crate::mechanism::{Amplitudes, Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
 /// Where the simulation has the separation as a function of the angle (Kirchhoff's steady curve), that function lags. While it follows
@@ -21,19 +21,28 @@ fn lagging(purpose: Purpose) -> Law {
     }
 }
 
-/// Elsewhere a separation is added whose lag vanishes in equilibrium, so that the steady curve stays the user's.
-fn beside_the_curve() -> Law {
-    Law::force(
-        "C_s*sin(rad*x)*(lag(1/(1 + exp((abs(x - tau_2*v) - a_s)/d_s)), tau_1) - 1/(1 + exp((abs(x) - a_s)/d_s)))",
-    )
-    .amplitude("C_s", "F", -20.0, 20.0)
-    .shape("a_s", "x", Grid::Quantiles("x", vec![0.5, 0.7, 0.85]))
-    .shape("d_s", "x", Grid::Values(vec![0.1, 0.3]))
-    .within(0.01, 3.0)
-    .shape("tau_1", "x/v", log_grid(0.05, 1.0, 3))
-    .within(0.005, 10.0)
-    .shape("tau_2", "x/v", Grid::Values(vec![0.1, 0.5]))
-    .within(0.0, 10.0)
+/// Elsewhere a separation is added: one whose lag vanishes in equilibrium, so that the steady curve stays the user's (`C_s`), or the whole of it, where
+/// the user's curve is that of a flow that never separates (`C_l`).
+fn beside_the_curve(purpose: Purpose) -> Law {
+    let attached = "lag(1/(1 + exp((abs(x - tau_2*v) - a_s)/d_s)), tau_1)";
+    let lagging = format!("C_s*sin(rad*x)*({attached} - 1/(1 + exp((abs(x) - a_s)/d_s)))");
+    let whole = format!("C_l*sin(rad*x)*({attached} - 1)");
+    let strong = |law: Law, name: &str| law.amplitude(name, "F", -20.0, 20.0);
+    let law = match purpose {
+        Purpose::Screening => {
+            let each = Law::force(format!("{lagging} + {whole}")).with_amplitudes(Amplitudes::Apart);
+            strong(strong(each, "C_s"), "C_l")
+        }
+        Purpose::Form(Form::Other) => strong(Law::force(whole), "C_l"),
+        _ => strong(Law::force(lagging), "C_s"),
+    };
+    law.shape("a_s", "x", Grid::Quantiles("x", vec![0.5, 0.7, 0.85]))
+        .shape("d_s", "x", Grid::Values(vec![0.1, 0.3]))
+        .within(0.01, 3.0)
+        .shape("tau_1", "x/v", log_grid(0.05, 1.0, 3))
+        .within(0.005, 10.0)
+        .shape("tau_2", "x/v", Grid::Values(vec![0.1, 0.5]))
+        .within(0.0, 10.0)
 }
 
 /// Flow separation that lags behind the angle of attack.
@@ -46,7 +55,7 @@ pub static STALL_LAG: Mechanism = Mechanism {
     already: &["lag(1/(1 + Z), P)"],
     law: |slot, purpose| match slot.separation() {
         Some(_) => lagging(purpose),
-        None => beside_the_curve(),
+        None => beside_the_curve(purpose),
     },
     contains: &[],
     confusable: &["bouc_wen", "viscoelastic", "displacement_dependent_damping"],

@@ -1,6 +1,6 @@
 //! A hysteretic spring whose two branches differ.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, log_grid};
+use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_grid};
 use crate::slot::Place;
 
 /// A hysteretic spring whose two branches differ.
@@ -13,7 +13,7 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
     already: &[],
     law: |slot, purpose| {
         if slot.place == Place::Loop {
-            return Law::force("a_z*(v*z + abs(v)*abs(z))").amplitude("a_z", "F/(v*z)", -1.0, 1.0);
+            return of_the_loop(purpose);
         }
         // The share a makes z tend to 1/(1 + 2 a)^(1/n) upwards and to 1/(1 - 2 a)^(1/n) downwards.
         Law::force("F_h*z")
@@ -36,3 +36,13 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
     signature: "Unequal upper and lower branches; even harmonics together with a loop.",
     reference: "C.-H. Wang, Y.-K. Wen, Evaluation of pre-Northridge low-rise steel buildings I: modeling, J. Struct. Eng. 126 (2000) 1151-1160",
 };
+
+/// A loop of the simulation whose branches differ: by the signs of both the velocity and the loop, or by one of them.
+fn of_the_loop(purpose: Purpose) -> Law {
+    let law = match purpose {
+        Purpose::Form(Form::Other) => "a_z*v*z",
+        Purpose::Form(Form::Few) => "a_z*abs(v)*abs(z)",
+        _ => "a_z*(v*z + abs(v)*abs(z))",
+    };
+    Law::force(law).amplitude("a_z", "F/(v*z)", -1.0, 1.0)
+}
