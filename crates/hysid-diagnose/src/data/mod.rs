@@ -243,11 +243,17 @@ impl DataSet {
 
     /// The same data with so many further inputs, zero throughout.
     pub fn with_still_inputs(&self, count: usize) -> Self {
+        let still: Vec<Vec<f64>> = self.stretches.iter().map(|s| vec![0.0; s.len()]).collect();
+        self.with_further_inputs(&vec![still; count])
+    }
+
+    /// The same data with further inputs, finite at each sample of each stretch: `[input][stretch][sample]`.
+    pub fn with_further_inputs(&self, further: &[Vec<Vec<f64>>]) -> Self {
         let mut out = self.clone();
-        for s in &mut out.stretches {
+        for (i, s) in out.stretches.iter_mut().enumerate() {
             let mut inputs = s.drive.inputs().to_vec();
-            inputs.resize(inputs.len() + count, vec![0.0; s.len()]);
-            // A good drive with zeros beside it is a good drive.
+            inputs.extend(further.iter().filter_map(|input| input.get(i).cloned()));
+            // A good drive with finite series beside it is a good drive.
             if let Ok(drive) = Drive::new(s.drive.start_s(), s.drive.period_s(), s.len(), inputs) {
                 s.drive = drive;
             }

@@ -4,6 +4,7 @@ use super::Search;
 use super::compose::{add, best_of};
 use super::detectable::detectability;
 use super::screen::{Candidate, screen};
+use super::tracked;
 use crate::budget::Step;
 use crate::calibration::lesson::{Done, Lesson, lesson};
 use crate::evidence::correlation_time;
@@ -85,6 +86,7 @@ pub fn explore<'a, 'd>(
     let detectable = detectability(&candidates);
     let search = Search::new(setting.clone(), options, hooks);
     let test = search.test(&candidates, &none.base, &evidence);
+    tracked::include(&mut candidates, tracked::along_the_recording(setting, &none));
     let mut p_value = test.p_value;
     // Where the residual is mismatch throughout, the plain sum of squares decides, with as many samples as are independent.
     let tau = correlation_time(&setting.data.layout, &none.base.fit.residual);

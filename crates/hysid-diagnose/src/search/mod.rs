@@ -23,6 +23,7 @@ pub mod screen;
 pub mod second_look;
 pub mod simpler;
 pub mod starts;
+pub mod tracked;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -228,10 +229,12 @@ impl<'a, 'd> Search<'a, 'd> {
 
     /// What could be missing around a hypothesis.
     fn around(&self, h: &Hypothesis<'_>) -> Vec<Candidate> {
-        match self.screened.borrow_mut().take() {
+        let mut found = match self.screened.borrow_mut().take() {
             Some((key, found)) if key == fitted_key(h) => found,
             _ => screen(&h.base, &self.setting.original, &h.effects, &h.base.evidence(), &|_, _| true),
-        }
+        };
+        tracked::include(&mut found, tracked::along_the_recording(&self.setting, h));
+        found
     }
 
     /// Offsets, drifts, ripples and lines that plain squares see around a hypothesis: a noise that rises towards low frequency holds the ones, an autoregression

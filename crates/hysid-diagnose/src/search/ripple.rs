@@ -4,7 +4,8 @@
 //! simulation the score of a force at each instant costs one run; summed up by the position at that instant, it is a signal over the position whose
 //! periodogram has a line at every period that the residual holds, against those that noise makes there (order tracking).
 //!
-//! The positions are those of the simulation: where it strays by a good part of a period, as a drive without a loop does, the line is smeared.
+//! The positions are those of the simulation: where it strays by a good part of a period, as a drive without a loop does, the line is smeared, and shows
+//! along the recorded motion only ([`super::tracked`]).
 //!
 //! Reference: K. R. Fyfe, E. D. S. Munck, Analysis of computed order tracking, Mech. Syst. Signal Process. 11 (1997) 187-205.
 

@@ -156,15 +156,36 @@ pub fn screen(
     evidence: &(Projector, Vec<f64>),
     keep: &dyn Fn(&Mechanism, &Slot) -> bool,
 ) -> Vec<Candidate> {
+    screen_along(base, Along { motion: base, bring: &|_| {} }, original, effects, evidence, keep)
+}
+
+/// The motion along which features are taken: that of the simulation as it runs, or another.
+#[derive(Clone, Copy)]
+pub struct Along<'a> {
+    /// The simulation that moves so, with further inputs and what they do.
+    pub motion: &'a Base<'a>,
+    /// Writes the same into a simulation with an effect.
+    pub bring: &'a (dyn Fn(&mut Simulation) + Sync),
+}
+
+/// The same with the features, and the evidence, along another motion.
+pub fn screen_along(
+    base: &Base<'_>,
+    along: Along<'_>,
+    original: &Simulation,
+    effects: &[Effect],
+    evidence: &(Projector, Vec<f64>),
+    keep: &dyn Fn(&Mechanism, &Slot) -> bool,
+) -> Vec<Candidate> {
     let (own, r) = evidence;
     let document = base.document();
     let structure = Structure::within(&document, original);
     let bare = Structure::of(original);
-    let peaks = residual_peaks(base);
+    let peaks = residual_peaks(along.motion);
     let ripples = || catalogue().iter().filter(|m| m.family == Family::PositionRipple);
     let looked_for = structure.slots.iter().any(|slot| ripples().any(|m| m.fits(slot) && keep(m, slot)));
-    let periods = if looked_for { residual_periods(base, &structure, r) } else { Vec::new() };
-    let at = signals(base, &structure, &peaks, &periods);
+    let periods = if looked_for { residual_periods(along.motion, &structure, r) } else { Vec::new() };
+    let at = signals(along.motion, &structure, &peaks, &periods);
     let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();
     for mechanism in catalogue() {
         for (place, slot) in structure.slots.iter().enumerate() {
@@ -178,13 +199,13 @@ pub fn screen(
             }
         }
     }
-    let values = base.values();
+    let values = along.motion.values();
     let total = norm2(r);
     let mut found: Vec<Candidate> = work
         .par_iter()
         .filter_map(|(mechanism, slot, signals)| {
             let screening = mechanism.rewrite(&document, slot, signals, Purpose::Screening).ok()?;
-            let mut points = features(base, &screening, slot, &values, own, r, total)?;
+            let mut points = features(along, &screening, slot, &values, own, r, total)?;
             points.sort_by(|a, b| b.score.total_cmp(&a.score));
             points.iter_mut().skip(JOINT).for_each(|p| p.joint = None);
             let purpose = mechanism.fitted_first(slot, &points.first()?.amplitudes);
@@ -198,7 +219,7 @@ pub fn screen(
 
 /// The columns of every point of a screening form.
 fn features(
-    base: &Base<'_>,
+    along: Along<'_>,
     screening: &Rewritten,
     slot: &Slot,
     values: &Values,
@@ -206,6 +227,7 @@ fn features(
     r: &[f64],
     total: f64,
 ) -> Option<Vec<Point>> {
+    let base = along.motion;
     let data = base.model.data();
     let starts = screening.starts();
     let mut points = Vec::new();
@@ -216,6 +238,7 @@ fn features(
             p.fixed = true;
         }
     }
+    (along.bring)(&mut document);
     let model = Model::new(&document, data, base.model.substeps()).ok()?;
     let start = with_added_starts(values, screening, slot, data.stretches.len());
     let mut theta = model.theta(&start);
