@@ -58,6 +58,8 @@ mod tests {
                 |above: f64, below: f64| limit.fitted_first(&slot, &[("a_p".into(), above), ("a_n".into(), below)]);
             assert_eq!(first(0.9, 0.8), Purpose::Refit);
             assert_eq!(first(1.1, -0.1), Purpose::Form(Form::Other));
+            // Nobody knows of a side that was never reached.
+            assert_eq!(first(1.1, 0.0), Purpose::Refit);
             assert_eq!(first(0.02, 0.7), Purpose::Form(Form::Few));
             let text = |purpose| format!("{:?}", limit.law_at(&slot, purpose).change);
             assert!(

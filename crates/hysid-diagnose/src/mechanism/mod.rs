@@ -148,7 +148,7 @@ impl Mechanism {
     }
 
     /// What it is fitted as at first, where these are the amplitudes of its screening form that explain a residual best: a law of two sides of which one
-    /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below); of laws that are screened one by one the form with this amplitude.
+    /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below), but for one that the signal never reached; of laws that are screened one by one the form with this amplitude.
     pub(crate) fn fitted_first(&self, slot: &Slot, amplitudes: &[(String, f64)]) -> Purpose {
         match (self.law_at(slot, Purpose::Screening).amplitudes, amplitudes) {
             (Amplitudes::Apart, [(name, _)]) => {
@@ -157,7 +157,7 @@ impl Mechanism {
                 self.forms(slot).into_iter().find(|(_, law)| has_it(law)).map_or(Purpose::Refit, |(form, _)| form)
             }
             (Amplitudes::OfTwoSides, [(_, above), (_, below)]) => {
-                let idle = |this: &f64, other: &f64| this.abs() < IDLE * other.abs();
+                let idle = |this: &f64, other: &f64| *this != 0.0 && this.abs() < IDLE * other.abs();
                 if idle(below, above) {
                     Purpose::Form(Form::Other)
                 } else if idle(above, below) {

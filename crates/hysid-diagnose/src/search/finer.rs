@@ -20,6 +20,8 @@ const WORTH_RECASTING: f64 = -5.0;
 const UNKNOWN: f64 = 8.0;
 /// Log evidence that makes an effect plain to see.
 const PLAIN_TO_SEE: f64 = 100.0;
+/// Log evidence within which two forms are one.
+const INDIFFERENT: f64 = 0.1;
 /// Log evidence within which two forms tie.
 const TIE: f64 = 3.0;
 /// Log likelihood by which one that ties must lead to be taken.
@@ -67,7 +69,9 @@ pub fn finer<'d>(
 /// tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would pass for
 /// another effect.
 fn preferred(merits: &[(f64, f64)], plain: bool) -> Option<usize> {
-    let top = (0..merits.len()).max_by(|&a, &b| merits[a].0.total_cmp(&merits[b].0))?;
+    let most = (0..merits.len()).max_by(|&a, &b| merits[a].0.total_cmp(&merits[b].0))?;
+    // What nothing speaks against stays as it is: a limit alike on both sides of which one was never reached.
+    let top = if merits[0].0 > merits[most].0 - INDIFFERENT { 0 } else { most };
     let (evidence, likelihood) = merits[top];
     let leaves_less = |i: &usize| merits[*i].0 >= evidence - TIE && merits[*i].1 > likelihood + LESS_LEFT;
     let closer = (0..merits.len()).filter(|i| plain && leaves_less(i));
