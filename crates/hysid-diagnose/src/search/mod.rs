@@ -1,8 +1,8 @@
 //! The search for a set of effects: what could be missing, the test, refit of the likeliest, composition.
 //!
-//! `explore` leads through it. `screen` looks at every mechanism at every slot, `fitting` takes the likeliest from their starts to their finish,
-//! `compose` puts effects together, `second_look` asks again where surrogates see nothing. What all of them share is the fitted set and the
-//! setting of its fits (`hypothesis`), and the time (`budget`).
+//! `explore` leads through it. `screen` looks at every mechanism at every slot (`tracked` does so along the recorded motion), `fitting` takes the likeliest
+//! from their starts to their finish, `compose` puts effects together, `second_look` asks again where surrogates see nothing. What all of them share is
+//! the fitted set and the setting of its fits (`hypothesis`), and the time (`budget`).
 
 pub mod assemble;
 pub mod compose;
