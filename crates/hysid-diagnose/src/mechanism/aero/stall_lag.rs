@@ -64,3 +64,19 @@ pub static STALL_LAG: Mechanism = Mechanism {
     signature: "A loop only above the stall angle; it depends on the rate and turns the other way round at slow pitching.",
     reference: "M. Goman, A. Khrabrov, State-space representation of aerodynamic characteristics of an aircraft at high angles of attack, J. Aircraft 31 (1994) 1109-1115",
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanism::conformance::specimens;
+    use crate::slot::Structure;
+
+    #[test]
+    fn where_the_flow_never_separates_the_whole_stall_may_be_missing() {
+        let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
+        let slots = structures.iter().flat_map(|s| STALL_LAG.slots(s));
+        let slot = slots.into_iter().find(|s| s.separation().is_none()).unwrap();
+        let first = |name: &str| STALL_LAG.fitted_first(&slot, &[(name.to_owned(), 1.0)]);
+        assert_eq!([first("C_s"), first("C_l")], [Purpose::Refit, Purpose::Form(Form::Other)]);
+    }
+}
