@@ -227,5 +227,11 @@ pub fn benches() -> Vec<Bench> {
     specimens().iter().zip(EXCITATION).filter_map(|(s, (period_s, size))| Bench::new(s, *period_s, *size)).collect()
 }
 
+/// The first slot of a mechanism in the specimens for which something holds.
+#[cfg(test)]
+pub(crate) fn slot_where(mechanism: &Mechanism, wanted: impl Fn(&Slot) -> bool) -> Option<Slot> {
+    specimens().iter().flat_map(|s| mechanism.slots(&Structure::of(s))).find(wanted)
+}
+
 #[cfg(test)]
 mod tests;

@@ -224,8 +224,7 @@ impl Base<'_> {
             return Some(self.fit.residual.clone());
         }
         let model = Model::new(self.model.simulation(), data, self.model.substeps()).ok()?;
-        let predicted = model.predict(&model.theta(&self.values()))?;
-        Some(data.y.iter().zip(&predicted).map(|(y, p)| y - p).collect())
+        model.residual(&model.theta(&self.values()))
     }
 
     /// The projector off the whitened tangent space of all unknowns, and the whitened residual projected off it.

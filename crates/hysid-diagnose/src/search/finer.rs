@@ -65,7 +65,7 @@ pub fn finer<'d>(
     chosen.checked_sub(1).map(|i| forms.swap_remove(i))
 }
 
-/// The form to be taken, of their evidences and log likelihoods: the one with the most evidence. Where an effect is plain to see, of those that
+/// The form to be taken, of their evidences and log likelihoods, the present one first: the one with the most evidence. Where an effect is plain to see, of those that
 /// tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would pass for
 /// another effect.
 fn preferred(merits: &[(f64, f64)], plain: bool) -> Option<usize> {

@@ -17,7 +17,7 @@ use crate::mechanism::Mechanism;
 use crate::model::Model;
 use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
 use crate::model::hypothesis::{Hypothesis, Setting};
-use crate::refit::LmOptions;
+use crate::refit::{LmOptions, Problem};
 use crate::slot::{Slot, Target};
 
 /// Bandwidths of the observer that are tried, in radians for each sample.
@@ -33,8 +33,8 @@ const INSTANTS: usize = 8;
 const MOST: usize = 6;
 const SCORE: f64 = 25.0;
 
-/// What could be missing around a hypothesis and promises most along the recorded motion, with the points of their grids there; none where the residual is not that of an
-/// unknown force, or no observer brings the simulation to the recording.
+/// What could be missing around a hypothesis and promises most along the recorded motion, with the points of their grids there; none where the residual
+/// is not that of an unknown force, or no observer brings the simulation to the recording.
 pub fn along_the_recording(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Candidate> {
     let base = &h.base;
     if !base.driven() {
@@ -94,7 +94,6 @@ impl Observer {
         let series: Vec<[Vec<f64>; 2]> =
             data.stretches.iter().map(|s| rates(s, output, document.time.hold)).collect::<Option<_>>()?;
         let further = [0, 1].map(|i| series.iter().map(|pair| pair[i].clone()).collect::<Vec<_>>());
-        let held = data.with_further_inputs(&further);
         let inputs = ["y_rec", "y_rate"].map(|name| {
             let symbol = document.fresh_symbol(name);
             Input { symbol: symbol.clone(), column: symbol }
@@ -103,20 +102,25 @@ impl Observer {
         let lacking = recorded - document.outputs[output].expression.clone();
         let noise = base.whitener.models[output].innovation();
         let free = data.layout.rms(&base.fit.residual)[output];
+        let mut observer = Self {
+            state: state.to_owned(),
+            inputs,
+            correction: Expr::Number(0.0),
+            data: data.with_further_inputs(&further),
+            left: f64::INFINITY,
+        };
         for bandwidth in BANDWIDTHS {
             let w = bandwidth / data.period_s;
-            let correction = match seen {
+            observer.correction = match seen {
                 Seen::Itself => Expr::Number(w / gain) * lacking.clone(),
                 Seen::Integrated => {
                     let slower = rate.clone() - Expr::Number(gain) * Expr::symbol(state);
                     Expr::Number(w * w / gain) * lacking.clone() + Expr::Number(2.0 * w / gain) * slower
                 }
             };
-            let inputs = inputs.clone();
-            let mut it = Self { state: state.to_owned(), inputs, correction, data: held.clone(), left: f64::INFINITY };
-            it.left = it.leaves(base, output)?;
-            if it.left < (FOLLOWS * noise).min(NEARER * free) {
-                return Some(it);
+            observer.left = observer.leaves(base, output)?;
+            if observer.left < (FOLLOWS * noise).min(NEARER * free) {
+                return Some(observer);
             }
         }
         None
@@ -138,8 +142,7 @@ impl Observer {
 
     fn leaves(&self, base: &Base<'_>, output: usize) -> Option<f64> {
         let model = self.model(base)?;
-        let predicted = model.predict(&model.theta(&base.values()))?;
-        let residual: Vec<f64> = self.data.y.iter().zip(&predicted).map(|(y, p)| y - p).collect();
+        let residual = model.residual(&model.theta(&base.values()))?;
         Some(self.data.layout.rms(&residual)[output])
     }
 

@@ -68,14 +68,11 @@ pub static STALL_LAG: Mechanism = Mechanism {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mechanism::conformance::specimens;
-    use crate::slot::Structure;
+    use crate::mechanism::conformance::slot_where;
 
     #[test]
     fn where_the_flow_never_separates_the_whole_stall_may_be_missing() {
-        let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
-        let slots = structures.iter().flat_map(|s| STALL_LAG.slots(s));
-        let slot = slots.into_iter().find(|s| s.separation().is_none()).unwrap();
+        let slot = slot_where(&STALL_LAG, |s| s.separation().is_none()).unwrap();
         let first = |name: &str| STALL_LAG.fitted_first(&slot, &[(name.to_owned(), 1.0)]);
         assert_eq!([first("C_s"), first("C_l")], [Purpose::Refit, Purpose::Form(Form::Other)]);
     }

@@ -61,14 +61,11 @@ fn of_the_loop(purpose: Purpose) -> Law {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mechanism::conformance::specimens;
-    use crate::slot::Structure;
+    use crate::mechanism::conformance::slot_where;
 
     #[test]
     fn of_the_ways_in_which_a_loop_wears_the_one_that_explains_most_is_fitted_first() {
-        let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
-        let slots = structures.iter().flat_map(|s| DEGRADATION.slots(s));
-        let slot = slots.into_iter().find(|s| s.place == Place::Loop).unwrap();
+        let slot = slot_where(&DEGRADATION, |s| s.place == Place::Loop).unwrap();
         for name in ["d_A", "d_nu", "d_eta"] {
             let first = DEGRADATION.law_at(&slot, DEGRADATION.fitted_first(&slot, &[(name.to_owned(), 1.0)]));
             let names: Vec<&str> = first.parameters.iter().map(|p| p.name.as_str()).collect();
