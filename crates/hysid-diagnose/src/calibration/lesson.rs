@@ -5,7 +5,7 @@
 //! whole gain for itself. Steps are chosen for the simulation without effects: a lag within a sampling period, a stop or an elastic contact asks
 //! for shorter ones, and the set with the smallest error of integration would win and not the true one.
 
-use super::fair::explains_no_less;
+use super::fair::{explains_no_less, recalibrated};
 use super::global::MOST_SUBSTEPS;
 use crate::evidence::norm2;
 use crate::model::Model;
@@ -124,7 +124,7 @@ pub fn lesson<'d>(
     let next = Setting { substeps, ..if only_fits { judged } else { setting }.clone() };
     let base = better.as_ref().unwrap_or(&none.base);
     let noise = (next.noise == judged.noise).then_some(&base.whitener);
-    let base = next.further(base, noise, 2, 20)?;
+    let base = recalibrated(&next, base, noise)?;
     Some(Lesson { substeps, base, only_fits, steps_only: better.is_none(), doing, note })
 }
 

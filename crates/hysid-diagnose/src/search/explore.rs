@@ -6,6 +6,7 @@ use super::detectable::detectability;
 use super::screen::{Candidate, screen};
 use super::tracked;
 use crate::budget::Step;
+use crate::calibration::fair::recalibrated;
 use crate::calibration::lesson::{Done, Lesson, lesson};
 use crate::evidence::correlation_time;
 use crate::file::DetectableRecord;
@@ -164,7 +165,7 @@ pub fn explore<'a, 'd>(
             let next = Setting { substeps: lesson.substeps, ..search.setting.clone() };
             let finely = Search::new(next, options, hooks);
             // The next search begins under the first noise model; here everything is judged under the one that decided.
-            let Some(base) = finely.setting.further(&lesson.base, None, 2, 20) else { return again(lesson) };
+            let Some(base) = recalibrated(&finely.setting, &lesson.base, None) else { return again(lesson) };
             let none = finely.setting.hypothesis(Vec::new(), base);
             let sets = finely.under_noise(&none, &pool);
             // Where the matter is not as clear with shorter steps, their error may have misled the whole search.
