@@ -4,7 +4,9 @@ use hysid_plant::{Compiled, Effort, Settings, Simulation};
 
 use crate::data::DataSet;
 use crate::data::plant::plant_data;
+use crate::evidence::norm2;
 use crate::model::{Model, Values};
+use crate::refit::Problem;
 
 /// Integration steps in each sampling period where the step-halving check gives no number.
 const SUBSTEPS: usize = 2;
@@ -14,6 +16,8 @@ pub const MOST_SUBSTEPS: usize = 8;
 const MOST_OF_STIFF: usize = 64;
 /// Error of integration, over the rms of the residual, from which on it is no matter of accuracy any more.
 const ASTRAY: f64 = 0.3;
+/// Size of a derivative, over that with half as long steps, or the other way round, below which it has settled.
+const SETTLED: f64 = 1.5;
 /// Steps for a simulation without states. It passes the check with one, but the memory that an effect adds to it does not: friction
 /// that slides within a sample was integrated wrongly, and the errors told were not those of the simulation that was written.
 const OF_STATIC: usize = 4;
@@ -24,7 +28,11 @@ pub fn starts(model: &Model<'_>, simulation: &Simulation, seed: u64) -> (Vec<Val
     let mut out = Vec::new();
     let mut substeps = SUBSTEPS;
     if let Some((values, steps)) = global(model, simulation, seed) {
-        substeps = if simulation.is_static() { OF_STATIC } else { followed(model, &values, steps.max(1)) };
+        substeps = if simulation.is_static() {
+            OF_STATIC
+        } else {
+            calm(model, &values, followed(model, &values, steps.max(1)), SETTLED)
+        };
         out.push(values);
     }
     out.push(own);
@@ -49,6 +57,29 @@ fn followed(model: &Model<'_>, values: &Values, asked: usize) -> usize {
     let residual = left(&exact, &model.data().y);
     let astray = |substeps: &usize| predicted(*substeps).is_none_or(|p| left(&p, &exact) > ASTRAY * ASTRAY * residual);
     [MOST_SUBSTEPS, 16, 32].into_iter().find(|s| *s < asked && !astray(s)).unwrap_or(asked)
+}
+
+/// These steps, or so many more that the derivatives by what is unknown are those of the simulation. A friction that is smoothed steeply
+/// (`tanh(v/0.008)`) chatters within its bounds where the machine sticks and steps are too long: its outputs are right, and their derivatives
+/// grow from step to step. Where no number of steps
+/// settles them to such a factor (impacts, chaos), these steps.
+pub fn calm(model: &Model<'_>, values: &Values, substeps: usize, settled: f64) -> usize {
+    let sizes = |substeps: usize| {
+        let m = Model::new(model.simulation(), model.data(), substeps).ok()?;
+        let (_, tangents) = m.tangent(&m.theta(values))?;
+        Some(tangents.iter().map(|t| norm2(t).sqrt()).collect::<Vec<f64>>())
+    };
+    let mut steps = substeps;
+    let mut now = sizes(steps);
+    while 2 * steps <= MOST_OF_STIFF {
+        let Some(finer) = sizes(2 * steps) else { break };
+        let alike = |(a, b): (&f64, &f64)| *a < settled * b && *b < settled * a || a == b;
+        if now.is_some_and(|now| now.iter().zip(&finer).all(alike)) {
+            return steps;
+        }
+        (steps, now) = (2 * steps, Some(finer));
+    }
+    substeps
 }
 
 /// The global calibration by plain squares, with so many iterations of its fits.
@@ -84,4 +115,39 @@ fn global(model: &Model<'_>, simulation: &Simulation, seed: u64) -> Option<(Valu
         }
     }
     Some((values, c.steps.substeps))
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Drive;
+
+    use super::*;
+
+    /// Steps that a drive which sticks gets in the place of eight, and its derivatives' size with these, over what it is with 64.
+    fn calmed(friction: &str) -> (usize, Vec<f64>) {
+        let text = format!(
+            "[time]\nperiod_s = 0.005\n[inputs]\nu = \"torque_Nm\"\n[parameters]\nJ = {{ value = 0.0131, min = 0.005, max = 0.05 }}\nb = {{ value = 0.0256, min = 0.01, max = 0.07 }}\nFc = {{ value = 0.72, min = 0.2, max = 3.0 }}\n\
+             [states]\nq = {{ derivative = \"w\", initial = 0.0 }}\nw = {{ derivative = \"(u - b*w - Fc*{friction})/J\", initial = 0.0 }}\n[outputs]\nangle_rad = \"q\"\n"
+        );
+        let simulation = Simulation::parse(&text, "drive.sim.toml").unwrap();
+        let u: Vec<f64> = (0..2000).map(f64::from).map(|i| 1.1 * (0.013 * i).sin() + 0.5 * (0.031 * i).cos()).collect();
+        let drive = Drive::new(0.0, 0.005, u.len(), vec![u.clone()]).unwrap();
+        let data = DataSet::of_drive(drive, vec![u], 0.005);
+        let model = Model::new(&simulation, &data, MOST_SUBSTEPS).unwrap();
+        let sizes = |substeps: usize| -> Vec<f64> {
+            let m = Model::new(&simulation, &data, substeps).unwrap();
+            m.tangent(&m.theta(&Values::default())).unwrap().1.iter().map(|t| norm2(t).sqrt()).collect()
+        };
+        let steps = calm(&model, &Values::default(), MOST_SUBSTEPS, SETTLED);
+        (steps, sizes(steps).iter().zip(sizes(64)).map(|(a, b)| a / b).collect())
+    }
+
+    #[test]
+    fn what_chatters_asks_for_shorter_steps() {
+        let (steps, sizes) = calmed("tanh(w/0.008)");
+        assert!(steps > MOST_SUBSTEPS && sizes.iter().all(|s| (0.7..1.4).contains(s)), "{steps} {sizes:?}");
+        // Dry friction that really sticks does not chatter.
+        let (steps, sizes) = calmed("sign(w)");
+        assert!(steps == MOST_SUBSTEPS && sizes.iter().all(|s| (0.99..1.01).contains(s)), "{steps} {sizes:?}");
+    }
 }

@@ -6,7 +6,7 @@
 //! for shorter ones, and the set with the smallest error of integration would win and not the true one.
 
 use super::fair::{explains_no_less, recalibrated};
-use super::global::MOST_SUBSTEPS;
+use super::global::{MOST_SUBSTEPS, calm};
 use crate::evidence::norm2;
 use crate::model::Model;
 use crate::model::base::Base;
@@ -20,6 +20,8 @@ const BETTER: (f64, f64) = (2.0, 0.05);
 /// Log likelihood that the error of integration may cost.
 const ERROR: f64 = 2.0;
 
+/// Size of a derivative, over that with half as long steps, at which it is none.
+const EXPLODED: f64 = 10.0;
 /// Times that the likeliest sets take once more of what the whole search took.
 const FITS: f64 = 0.5;
 
@@ -150,7 +152,8 @@ fn enough(setting: &Setting<'_>, h: &Hypothesis<'_>) -> usize {
             0.5 * norm2(&h.base.whitener.apply(&setting.data.layout, &off)) < ERROR
         })
     });
-    wanted.unwrap_or(most)
+    // What chatters shows the right outputs, and derivatives that no fit can follow.
+    calm(&h.base.model, &values, wanted.unwrap_or(most), EXPLODED)
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use hysid_plant::Drive;
 
 use crate::evidence::{Layout, Series, norm2};
 
-use thinning::{step, thin, together};
+use thinning::{end_of_row, step, thin, together};
 pub use windows::held_out_blocks;
 
 /// Gaps cut a recording into stretches; shorter ones than this are left out.
@@ -147,6 +147,19 @@ impl DataSet {
     pub fn rows_of<'a>(&self, series: &Series, samples: &'a [f64]) -> Cow<'a, [f64]> {
         let last = series.first + series.rows.len().saturating_sub(1) * self.step;
         thin(&samples[series.first..=last], self.step)
+    }
+
+    /// The outputs of a stretch at the last sample of each row, which tells nothing of the row itself to what follows; `NaN` elsewhere.
+    pub fn last_of_rows(&self, stretch: usize) -> Vec<Vec<f64>> {
+        let outputs = &self.stretches[stretch].outputs;
+        let mut last: Vec<Vec<f64>> = outputs.iter().map(|y| vec![f64::NAN; y.len()]).collect();
+        for s in self.layout.series.iter().filter(|s| s.stretch == stretch) {
+            let ends = (0..s.rows.len()).map(|row| s.first + row * self.step + end_of_row(self.step));
+            for n in ends.filter(|n| *n < outputs[s.output].len()) {
+                last[s.output][n] = outputs[s.output][n];
+            }
+        }
+        last
     }
 
     /// The stacked outputs, each less its mean.

@@ -73,6 +73,11 @@ pub fn thin(x: &[f64], step: usize) -> Cow<'_, [f64]> {
     Cow::Owned(rows.collect())
 }
 
+/// The last sample of a row of `step` samples, from the one in whose place the row stands.
+pub fn end_of_row(step: usize) -> usize {
+    step.saturating_sub(step / 2 + 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::DataSet;

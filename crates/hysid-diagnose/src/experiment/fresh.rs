@@ -13,6 +13,7 @@
 use hysid_plant::{Drive, Initial, Simulation};
 
 use crate::data::DataSet;
+use crate::evidence::norm2;
 use crate::model::base::{Base, QUANTILE};
 use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::model::{Model, Values};
@@ -31,6 +32,10 @@ const LIKELY: f64 = 0.005;
 const KNOWN: f64 = 0.25;
 /// Share of the set's probability that it has with strengths that are known worse at the ends of their intervals, all of these together.
 const SHARE: f64 = 0.5;
+
+/// Squares that an end of an interval may cost, over what it costs where the tangents hold; halvings of the way to it.
+const STILL: f64 = 1.5;
+const HALVINGS: i32 = 6;
 
 /// The fitted simulation as it starts anew: where the document says, free states at zero.
 pub fn started(base: &Base<'_>) -> Simulation {
@@ -53,17 +58,29 @@ fn uncertain(h: &Hypothesis<'_>) -> Vec<Simulation> {
     let strengths = h.effects.iter().flat_map(|e| &e.written.amplitudes);
     let places = strengths.filter_map(|a| base.model.place_of(&a.name));
     let unknown = places.filter(|&i| covariance[i * (k + 1)].sqrt() > KNOWN * theta[i].abs());
+    let layout = &base.model.data().layout;
+    let error = |theta: &[f64]| {
+        let residual = base.model.residual(theta)?;
+        Some(norm2(&base.whitener.apply(layout, &residual)))
+    };
+    let most = norm2(&base.whitener.apply(layout, &base.fit.residual)) + STILL * QUANTILE.powi(2) * base.variance();
     unknown
         .flat_map(|i| {
             let variance = covariance[i * (k + 1)];
-            [-QUANTILE, QUANTILE].map(|times| {
+            // Along a valley that bends the tangents lead too far: less of the way where the recording refutes its end.
+            let ends = [-QUANTILE, QUANTILE].map(|times| {
                 let end = (theta[i] + times * variance.sqrt()).clamp(bounds[i].0, bounds[i].1);
-                let moved = |j: usize| {
-                    let x = theta[j] + covariance[i * k + j] / variance * (end - theta[i]);
-                    if x.is_finite() { x.clamp(bounds[j].0, bounds[j].1) } else { theta[j] }
+                let moved = |end: f64| -> Vec<f64> {
+                    let follow = |j: usize| {
+                        let x = theta[j] + covariance[i * k + j] / variance * (end - theta[i]);
+                        if x.is_finite() { x.clamp(bounds[j].0, bounds[j].1) } else { theta[j] }
+                    };
+                    (0..k).map(follow).collect()
                 };
-                started_at(base, &(0..k).map(moved).collect::<Vec<_>>())
-            })
+                let ways = (0..HALVINGS).map(|n| moved(theta[i] + 0.5_f64.powi(n) * (end - theta[i])));
+                ways.into_iter().find(|theta| error(theta).is_some_and(|e| e <= most))
+            });
+            ends.into_iter().flatten().map(|theta| started_at(base, &theta)).collect::<Vec<_>>()
         })
         .collect()
 }
@@ -224,6 +241,23 @@ mod tests {
         let (fitted, ends) = strengths_of(0.0);
         let [low, high] = ends[..] else { panic!("{ends:?}") };
         assert!(low < fitted && fitted < high && (high + low - 2.0 * fitted).abs() < 1e-6 * (high - low), "{ends:?}");
+    }
+
+    #[test]
+    fn an_end_that_the_recording_refutes_is_none() {
+        crate::search::gentle::tests::with_a_spill(|_, h| {
+            let residual = |document: &Simulation| {
+                let model = Model::new(document, h.base.model.data(), h.base.model.substeps()).unwrap();
+                norm2(&model.residual(&model.theta(&Values::default())).unwrap())
+            };
+            let ends = uncertain(h);
+            assert!(!ends.is_empty(), "the strength is known");
+            let least = residual(&started(&h.base));
+            for end in &ends {
+                let rise = h.base.model.data().rows() as f64 * (residual(end) / least - 1.0);
+                assert!(rise < 2.0 * QUANTILE.powi(2), "{rise} {:?}", end.parameter("c_o"));
+            }
+        });
     }
 
     fn pushed() -> Drive {

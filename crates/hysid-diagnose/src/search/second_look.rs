@@ -56,6 +56,18 @@ impl<'d> Search<'_, 'd> {
     /// where a set turns a coloured residual into a white one: there the simulation as it is has the best colour that could be found for it, and the set
     /// has none to choose. What changes at an end of the recording may be how it began (a play that the simulation has, and that an earlier input moved).
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
+        let fitted: Vec<&Hypothesis<'d>> = fitted.iter().collect();
+        let (p, best) = self.likeliest(start, &fitted, candidates)?;
+        (p < self.level() && self.holds_on_blocks(start, best)).then_some(p)
+    }
+
+    /// The same bound whatever it is, with the set that is least by chance.
+    pub fn likeliest<'h>(
+        &self,
+        start: &Hypothesis<'d>,
+        fitted: &[&'h Hypothesis<'d>],
+        candidates: usize,
+    ) -> Option<(f64, &'h Hypothesis<'d>)> {
         let sets = |h: &Hypothesis<'_>| {
             (0..h.effects.len())
                 .map(|i| {
@@ -76,10 +88,9 @@ impl<'d> Search<'_, 'd> {
         let whitens = |h: &Hypothesis<'_>| !start.base.whitener.is_white() && h.base.whitener.is_white();
         let odds = |h: &Hypothesis<'_>| if whitens(h) { 1.0 } else { ODDS_AGAINST };
         let bound = |h: &Hypothesis<'_>| odds(h) * sets(h) * (none - evidence(h)).exp();
-        let fitted = || fitted.iter().filter(|h| !h.effects.iter().any(|e| h.changes_at_an_end(e)));
+        let fitted = || fitted.iter().copied().filter(|h| !h.effects.iter().any(|e| h.changes_at_an_end(e)));
         let best = fitted().min_by(|a, b| bound(a).total_cmp(&bound(b)))?;
-        let p = together(fitted().filter(|h| h.effects.len() == best.effects.len()).map(bound));
-        (p < self.level() && self.holds_on_blocks(start, best)).then_some(p)
+        Some((together(fitted().filter(|h| h.effects.len() == best.effects.len()).map(bound)), best))
     }
 
     /// The level of each test of the second look.
