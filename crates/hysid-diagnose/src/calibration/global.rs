@@ -61,8 +61,7 @@ fn followed(model: &Model<'_>, values: &Values, asked: usize) -> usize {
 
 /// These steps, or so many more that the derivatives by what is unknown are those of the simulation. A friction that is smoothed steeply
 /// (`tanh(v/0.008)`) chatters within its bounds where the machine sticks and steps are too long: its outputs are right, and their derivatives
-/// grow from step to step. Where no number of steps
-/// settles them to such a factor (impacts, chaos), these steps.
+/// grow from step to step. Where no number of steps settles them to such a factor (impacts, chaos), these steps.
 pub fn calm(model: &Model<'_>, values: &Values, substeps: usize, settled: f64) -> usize {
     let sizes = |substeps: usize| {
         let m = Model::new(model.simulation(), model.data(), substeps).ok()?;

@@ -10,15 +10,16 @@ pub mod force;
 mod growth;
 pub mod hold;
 pub mod hypothesis;
+mod predicting;
 mod unknowns;
 
 use hysid_plant::{Compiled, Direction, Expr, Initial, Observer, Run, Sensitivity, Simulation, Start};
 use rayon::prelude::*;
 
 use crate::data::DataSet;
-use crate::data::plant::plant_data;
 use crate::refit::Problem;
 pub use along::along;
+use predicting::Corrections;
 use unknowns::slope;
 pub use unknowns::{Count, Unknown, Values};
 
@@ -34,15 +35,6 @@ pub struct Model<'d> {
     substeps: usize,
     /// What corrects the states of each stretch; none where the simulation runs free.
     observers: Vec<Corrections>,
-}
-
-/// What an observer corrects a stretch by.
-#[derive(Debug)]
-struct Corrections {
-    /// State by output.
-    gain: Vec<f64>,
-    /// What is measured at the samples at which it corrects.
-    measured: Outputs,
 }
 
 /// `[output][sample]` of one stretch.
@@ -75,21 +67,6 @@ impl<'d> Model<'d> {
             }
         }
         Ok(Self { compiled, data, unknowns, bounds, from_document, substeps: substeps.max(1), observers: Vec::new() })
-    }
-
-    /// The same predicting each row from those before: an observer takes what acts on the machine besides its inputs for `strength` times as strong as
-    /// these. `None` where no output tells it anything.
-    pub fn predicting(self, theta: &[f64], strength: f64) -> Option<Self> {
-        let all = plant_data(&self.compiled, self.data)?;
-        let parameters = self.parameters(theta, &[]);
-        let (responses, _) = self.responses(theta);
-        let observers = all.iter().zip(&responses).enumerate().map(|(stretch, (data, response))| {
-            let first: Vec<f64> = response.states.iter().map(|x| x.first().copied().unwrap_or(0.0)).collect();
-            let gain = self.compiled.observer_gain(data, &parameters, &first, strength);
-            Corrections { gain, measured: self.data.last_of_rows(stretch) }
-        });
-        let observers: Vec<Corrections> = observers.collect();
-        observers.iter().any(|o| o.gain.iter().any(|k| *k != 0.0)).then_some(Self { observers, ..self })
     }
 
     /// The document.
@@ -418,43 +395,5 @@ impl Problem for Model<'_> {
         let (mut p, columns) = self.tangents(theta, &places)?;
         p.iter_mut().zip(&self.data.y).for_each(|(p, y)| *p = y - *p);
         Some((p, columns))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::hypothesis::recorded;
-    use super::*;
-
-    /// Rows of one sample and rows of several: what is measured from a row on changes the predictions of those that follow it and of no other.
-    #[test]
-    fn a_prediction_knows_nothing_of_its_own_row() {
-        let text = "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_N\"\n[parameters]\nc = { value = 2.0, min = 0.1 }\nk = { value = 9.0, min = 0.1 }\n\
-                    [states]\nx = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"u - c*v - k*x\", initial = 0.0 }\n[outputs]\nx_m = \"x\"\n";
-        let simulation = Simulation::parse(text, "spring.sim.toml").unwrap();
-        let n = 8000;
-        let u: Vec<f64> = (0..n).map(f64::from).map(|i| (0.002 * i).sin() + 0.4 * (0.009 * i).cos()).collect();
-        let y: Vec<f64> =
-            (0..n).map(f64::from).map(|i| 0.1 * (0.002 * i - 0.2).sin() + 0.03 * (0.009 * i).cos()).collect();
-        // The same values in another order: the observer's gain rests on their rms.
-        let turned = |from: usize| [&y[..from], &y[from..].iter().rev().copied().collect::<Vec<_>>()].concat();
-        let predictions = |y: &[f64], thin: bool| {
-            let all = recorded(&simulation, 0.01, [("u_N", u.clone()), ("x_m", y.to_vec())]);
-            let data = if thin { all.thinned().into_owned() } else { all };
-            let model = Model::new(&simulation, &data, 2).unwrap();
-            let theta = model.theta(&Values::default());
-            let free = model.predict(&theta).unwrap();
-            let model = model.predicting(&theta, 0.1).unwrap();
-            (data.step, free, model.predict(&theta).unwrap())
-        };
-        for thin in [false, true] {
-            let (step, free, own) = predictions(&y, thin);
-            assert_eq!(step > 1, thin);
-            assert!(own.iter().zip(&free).any(|(a, b)| (a - b).abs() > 1e-3), "it runs free");
-            let row = 500;
-            let (_, _, other) = predictions(&turned(row * step - step / 2), thin);
-            let parts = own.iter().zip(&other).position(|(a, b)| (a - b).abs() > 1e-9 * (1.0 + a.abs()));
-            assert_eq!(parts, Some(row + 1), "rows of {step} samples");
-        }
     }
 }

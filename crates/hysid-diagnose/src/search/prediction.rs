@@ -44,7 +44,8 @@ impl<'d> Search<'_, 'd> {
         }
         let mut order: Vec<&Hypothesis<'d>> = pool.iter().filter(|h| !h.effects.is_empty()).collect();
         order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        order.truncate(WEIGHED);
+        // Where time is up there is some for the likeliest.
+        order.truncate(if setting.budget.affords(0.0) { WEIGHED } else { 1 });
         let sets: Vec<(&Hypothesis<'d>, Option<Hypothesis<'d>>)> = order
             .into_iter()
             .map(|h| {
