@@ -47,7 +47,7 @@ fn followed(model: &Model<'_>, values: &Values, asked: usize) -> usize {
     }
     let asked = asked.min(MOST_OF_STIFF);
     let predicted = |substeps: usize| {
-        let m = Model::new(model.simulation(), model.data(), substeps).ok()?;
+        let m = model.with_substeps(substeps)?;
         m.predict(&m.theta(values))
     };
     let Some(exact) = predicted(asked) else { return MOST_SUBSTEPS };
@@ -64,7 +64,7 @@ fn followed(model: &Model<'_>, values: &Values, asked: usize) -> usize {
 /// grow from step to step. Where no number of steps settles them to such a factor (impacts, chaos), these steps.
 pub fn calm(model: &Model<'_>, values: &Values, substeps: usize, settled: f64) -> usize {
     let sizes = |substeps: usize| {
-        let m = Model::new(model.simulation(), model.data(), substeps).ok()?;
+        let m = model.with_substeps(substeps)?;
         let (_, tangents) = m.tangent(&m.theta(values))?;
         Some(tangents.iter().map(|t| norm2(t).sqrt()).collect::<Vec<f64>>())
     };

@@ -8,7 +8,6 @@
 use super::fair::{explains_no_less, recalibrated};
 use super::global::{MOST_SUBSTEPS, calm};
 use crate::evidence::norm2;
-use crate::model::Model;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Setting};
 
@@ -141,7 +140,7 @@ fn enough(setting: &Setting<'_>, h: &Hypothesis<'_>) -> usize {
     let now = h.base.model.substeps();
     let values = h.base.values();
     let predicted = |substeps: usize| {
-        let m = Model::new(h.base.model.simulation(), setting.data, substeps).ok()?;
+        let m = h.base.model.with_substeps(substeps)?;
         m.predict(&m.theta(&values))
     };
     let most = MOST_SUBSTEPS.max(now);

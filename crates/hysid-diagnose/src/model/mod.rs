@@ -69,6 +69,11 @@ impl<'d> Model<'d> {
         Ok(Self { compiled, data, unknowns, bounds, from_document, substeps: substeps.max(1), observers: Vec::new() })
     }
 
+    /// The same with other integration steps in each sampling period, running free.
+    pub fn with_substeps(&self, substeps: usize) -> Option<Self> {
+        Self::new(self.simulation(), self.data, substeps).ok()
+    }
+
     /// The document.
     pub fn simulation(&self) -> &Simulation {
         self.compiled.simulation()

@@ -180,18 +180,18 @@ pub fn explore<'a, 'd>(
         Some(lesson) => return again(lesson),
         None => (search, none),
     };
+    let by_chance = if significant { search.by_a_force(&none, &pool, candidates.len()) } else { None };
+    if let Some(p) = by_chance {
+        notes.push("predicted from sample to sample, the simulation as it is follows the recording better than any set of effects that was fitted to its free run: random forces that act on the machine explain what is left".into());
+        (significant, p_value) = (false, p);
+        pool.clear();
+    }
     for question in request.questions {
         (hooks.progress)("weighing what was asked");
         match search.answer(&none, question) {
             Some(h) => add(&mut pool, h),
             None => notes.push(format!("{} could not be fitted", words(question))),
         }
-    }
-    let by_chance = if significant { search.by_a_force(&none, &pool, candidates.len()) } else { None };
-    if let Some(p) = by_chance {
-        notes.push("predicted from sample to sample, the simulation as it is follows the recording better than any set of effects that was fitted to its free run: random forces that act on the machine explain what is left".into());
-        (significant, p_value) = (false, p);
-        pool.clear();
     }
     pool.insert(0, none);
     Explored { search, pool, candidates, significant, shown, p_value, residual, detectable, least, notes }
