@@ -26,6 +26,8 @@ pub enum Need {
     ActivityChange(&'static str),
     /// The signal rests for a while.
     Rest(&'static str),
+    /// The size of the signal falls below this share of its largest: a threshold that is always exceeded is an offset.
+    Below(&'static str, f64),
     /// The input turns at least so often.
     Turns(usize),
     /// The excited frequencies span this factor.
@@ -125,6 +127,19 @@ impl Need {
                 let resting = s.windows(2).filter(|w| matches!(w, [a, b] if (b - a).abs() < limit)).count();
                 (resting * 20 < s.len()).then(|| format!("{} never rests", word(symbol)))
             }
+            Self::Below(symbol, share) => {
+                let s = series(symbol)?;
+                let crosses = s.windows(2).any(|w| matches!(w, [a, b] if a * b <= 0.0));
+                let (low, high) = s.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v.abs()), h.max(v.abs())));
+                (!crosses && low > share * high).then(|| {
+                    format!(
+                        "{} never falls below {:.0} % of its largest, {:.0} % are needed",
+                        word(symbol),
+                        100.0 * low / high,
+                        100.0 * share
+                    )
+                })
+            }
             Self::Turns(least) => {
                 let s = ["u", "y", "x", "F"].iter().find_map(|symbol| series(symbol))?;
                 let found = turns(signals, s).len();
@@ -183,6 +198,7 @@ impl Need {
             Self::EarlyAndLate(_) => "activity early and late".to_owned(),
             Self::ActivityChange(_) => "pauses or a change of level".to_owned(),
             Self::Rest(symbol) => format!("{} at rest for a while", word(symbol)),
+            Self::Below(symbol, share) => format!("{} below {:.0} % of its largest", word(symbol), 100.0 * share),
             Self::Turns(least) => format!("at least {least} turning points"),
             Self::Band(factor) => format!("excited frequencies over a factor of {factor}"),
             Self::Angle(least) => format!("a swing of {least} rad"),

@@ -183,9 +183,13 @@ impl Mechanism {
         if missing.is_empty() { None } else { Some(missing.join("; ")) }
     }
 
-    /// Whether the law can be written at all: the step of a sensor that shows none cannot.
+    /// Whether the law can be written at all: the step of a sensor that shows none cannot, and a threshold that is always exceeded is an offset.
     pub fn is_written_from(&self, signals: &Signals) -> bool {
-        !self.needs.contains(&Need::Steps) || signals.resolution().is_some()
+        self.needs.iter().all(|need| match need {
+            Need::Steps => signals.resolution().is_some(),
+            Need::Below(..) => need.lacking(signals).is_none(),
+            _ => true,
+        })
     }
 }
 

@@ -56,6 +56,7 @@ fn place_name(place: Place) -> &'static str {
         Place::Loop => "loop of the simulation",
         Place::Plays => "plays of the simulation",
         Place::Store => "store",
+        Place::Circuit => "first-order electrical state",
         Place::Sensor => "sensor",
         Place::Parameter => "parameter",
         Place::Disturbance => "disturbance",

@@ -4,7 +4,7 @@ use hysid_plant::{Expr, Simulation, State};
 
 use super::algebra::{coefficient, constant_coefficient, linear_coefficient, only_parameters, quotient, unless_one};
 use super::find::Finder;
-use super::motion::{Motion, force_of};
+use super::motion::{Kinematic, Motion, force_of};
 use super::{Place, Pull, Slot, Target};
 
 /// Whether a product is told with a minus.
@@ -144,11 +144,11 @@ impl Finder<'_> {
     }
 
     /// Connections with a motion that an input prescribes, as the ground under a structure: a force that holds a velocity and the rate of the input
-    /// together.
+    /// together, or a spring between the two, as a tyre. A controller's gain is known, a spring's rate is not.
     fn bases(&self) -> Vec<Slot> {
         let mut slots = Vec::new();
         for one in &self.motions {
-            let Some(x) = one.x else { continue };
+            let Some(x) = one.x.filter(|x| one.derivative.uses(x)) else { continue };
             for input in &self.simulation.inputs {
                 let rate = Expr::symbol(&input.symbol).derivative_of_input();
                 let holds_rate = |term: &Expr| {
@@ -156,22 +156,46 @@ impl Finder<'_> {
                     term.visit(&mut |e| found |= *e == rate);
                     found && term.uses(one.v)
                 };
-                if !one.derivative.uses(x) || !forces_of(self.simulation, one).any(|(_, term)| holds_rate(term)) {
+                let of_input =
+                    |scale: Option<&Expr>, e: Expr| scale.map_or(e.clone(), |scale| scale.clone() * e.clone());
+                let scale = self.travel(one, x, &input.symbol);
+                if scale.is_none() && !forces_of(self.simulation, one).any(|(_, term)| holds_rate(term)) {
                     continue;
                 }
+                let scale = scale.and_then(unless_one);
                 let stretch = Stretch {
-                    x: Expr::symbol(x) - Expr::symbol(&input.symbol),
-                    v: one.rate() - rate,
+                    x: Expr::symbol(x) - of_input(scale.as_ref(), Expr::symbol(&input.symbol)),
+                    v: one.rate() - of_input(scale.as_ref(), rate),
                     symbol: &input.symbol,
                     sign: 1.0,
                     lever: None,
                     other: None,
                     words: format!("between {x} and {}", input.symbol),
                 };
-                slots.push(self.connection(one, stretch));
+                let mut slot = self.connection(one, stretch);
+                // The spring's rate is for each unit of the displacement, which the input may count in another.
+                if let Some((k, scale)) = slot.quantity("k").map(|q| q.expression.clone()).zip(scale) {
+                    slot.offer(self.simulation, "k", quotient(k, scale));
+                }
+                slots.push(slot);
             }
         }
         slots
+    }
+
+    /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too: `0.001` of a road in mm.
+    fn travel(&self, one: &Motion<'_>, x: &str, input: &str) -> Option<Expr> {
+        if self.kinematic_input(input) != Kinematic::Displacement {
+            return None;
+        }
+        forces_of(self.simulation, one).find_map(|(_, term)| {
+            let [held, given] = [x, input].map(|s| constant_coefficient(self.simulation, term, s));
+            let (held, given) = (held?, given?);
+            let estimated = |s: &String| self.simulation.parameter(s).is_some_and(|p| !p.fixed);
+            let scale = quotient(-given, held.clone());
+            (held.symbols().iter().any(estimated) && scale.symbols().is_empty() && !is_negative(&scale))
+                .then_some(scale)
+        })
     }
 
     /// What a connection takes of the first displacement for each unit of the second where that is not one, as a gear has it: the terms of the
@@ -261,17 +285,26 @@ pub(super) mod tests {
 
     /// Displacement, velocity and stiffness of the slots of a kind, with the states that they pull at.
     pub fn slots(place: Place, states: &[(&str, &str, &str)]) -> Vec<[String; 4]> {
+        slots_driven("torque_Nm", place, states)
+    }
+
+    /// The same with an input from this column.
+    fn slots_driven(column: &str, place: Place, states: &[(&str, &str, &str)]) -> Vec<[String; 4]> {
         let told = |slot: &Slot| {
             let of = |symbol: &str| slot.quantity(symbol).map_or(String::new(), |q| q.expression.to_string());
             let Target::Derivatives(pulls) = &slot.target else { panic!("{}", slot.label) };
             let pull = |p: &Pull| format!("{}{}", if p.sign > 0.0 { "-" } else { "+" }, p.of(&Expr::symbol(&p.state)));
             [of("x"), of("v"), of("k"), pulls.iter().map(pull).collect::<Vec<_>>().join(" ")]
         };
-        slots_of(place, states).iter().map(told).collect()
+        found(column, place, states).iter().map(told).collect()
     }
 
     /// The slots of a kind, of a simulation with these states (name, derivative, unit).
     pub fn slots_of(place: Place, states: &[(&str, &str, &str)]) -> Vec<Slot> {
+        found("torque_Nm", place, states)
+    }
+
+    fn found(column: &str, place: Place, states: &[(&str, &str, &str)]) -> Vec<Slot> {
         let states: String = states
             .iter()
             .map(|(name, derivative, unit)| {
@@ -279,7 +312,7 @@ pub(super) mod tests {
             })
             .collect();
         let text = format!(
-            "[time]\nperiod_s = 0.01\n[inputs]\nu = \"torque_Nm\"\n[parameters]\nJ = {{ value = 2.0, min = 0.1 }}\nk = {{ value = 50.0, min = 1.0 }}\n\
+            "[time]\nperiod_s = 0.01\n[inputs]\nu = \"{column}\"\n[parameters]\nJ = {{ value = 2.0, min = 0.1 }}\nk = {{ value = 50.0, min = 1.0 }}\n\
              c = {{ value = 0.3, min = 0.0 }}\nn = {{ value = 4.0, fixed = true }}\n[states]\n{states}[outputs]\nspeed_rad_s = \"w2\"\n"
         );
         let simulation = Simulation::parse(&text, "test.sim.toml").unwrap();
@@ -347,6 +380,11 @@ pub(super) mod tests {
         );
         // A controller's reference is no ground.
         assert!(slots(Place::Connection, &[based[0], ("w2", "(k*(u - q2) - c*w2)/J", rate)]).is_empty());
+        let road = "road_mm";
+        let driven = |spring: &str| slots_driven(road, Place::Connection, &[("q2", "w2", "m"), ("w2", spring, "m/s")]);
+        assert!(driven("(n*(0.001*u - q2) - k*q2 - c*w2)/J").is_empty());
+        let tyre = driven("(k*(0.001*u - q2) - c*w2)/J");
+        assert_eq!(tyre, [["q2 - 0.001*u", "w2 - 0.001*d(u)", "k", "-w2"].map(str::to_owned)]);
         assert!(slots(Place::Connection, &twisted("w1 + w2", "(u - k*z)/J", "-k*z/J")).is_empty());
     }
 }

@@ -33,6 +33,7 @@ impl Structure {
         slots.extend(finder.own_loops());
         slots.extend(finder.own_plays());
         slots.extend(finder.stores());
+        slots.extend(finder.circuits());
         slots.extend(finder.sensors());
         slots.extend(finder.parameters());
         slots.extend(finder.disturbances());

@@ -81,6 +81,8 @@ pub enum Place {
     Plays,
     /// A first-order state that holds something.
     Store,
+    /// A first-order electrical state, whose own law is to it what a spring is to a displacement: flux in iron, the charge of a varactor.
+    Circuit,
     /// The measured output, as a sensor.
     Sensor,
     /// A parameter.

@@ -112,12 +112,17 @@ pub(super) fn angle(unit: &Unit) -> Option<Expr> {
     }
 }
 
-/// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name.
+/// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name, or a capacitor that
+/// a current charges.
 fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Expr> {
     let others = |s: &String| s != velocity && s != "pi" && simulation.parameter(s).is_none();
-    if position.derivative.symbols().iter().any(others)
-        || kinematic(simulation.unit_of(&position.name).as_ref(), &position.name) != Kinematic::Displacement
-    {
+    let unit = simulation.unit_of(&position.name);
+    let charged = || {
+        let current = simulation.unit_of(velocity).is_some_and(|u| is_one_of(&u, &["A"]));
+        current && unit.as_ref().is_some_and(|u| is_one_of(u, &["V", "C"]))
+    };
+    let moved = kinematic(unit.as_ref(), &position.name) == Kinematic::Displacement || charged();
+    if position.derivative.symbols().iter().any(others) || !moved {
         return None;
     }
     constant_coefficient(simulation, &position.derivative, velocity)

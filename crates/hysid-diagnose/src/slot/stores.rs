@@ -1,4 +1,4 @@
-//! The slots at which something is stored: the level of a tank, a temperature, a pressure.
+//! The slots at which something is stored: the level of a tank, a temperature, a pressure; flux, charge and current in circuits.
 
 use hysid_plant::Expr;
 
@@ -9,7 +9,11 @@ use super::{Place, Pull, Slot, Target};
 impl Finder<'_> {
     pub(super) fn store_slot(&self, place: Place, label: String, name: &str, derivative: &Expr) -> Slot {
         let target = Target::Derivatives(vec![Pull::new(name, 1.0)]);
-        let mut slot = Slot::new(place, label, name.to_owned(), target);
+        let whereabouts = match place {
+            Place::Circuit => format!("that {name} stands for in the circuit"),
+            _ => name.to_owned(),
+        };
+        let mut slot = Slot::new(place, label, whereabouts, target);
         slot.offer(self.simulation, "s", Expr::symbol(name));
         self.offer_force(&mut slot, derivative, Some(name), name, None);
         slot.context = vec![derivative.clone()];
@@ -32,11 +36,31 @@ impl Finder<'_> {
             return Vec::new();
         }
         // Beside a motion a state may be a controller's or a filter's: only what has the unit of something held is a store.
+        // A capacitor is one even where its charge plays the part of a displacement.
         let holds = |name: &str| {
-            let unit = self.simulation.unit_of(name);
-            self.motions.is_empty() || (!self.moves(name) && unit.is_some_and(|u| is_one_of(&u, &["Pa", "K", "m^3"])))
+            let has = |units: &[&str]| self.simulation.unit_of(name).is_some_and(|u| is_one_of(&u, units));
+            let charged = || self.motions.iter().any(|m| m.x == Some(name)) && has(&["C", "V"]);
+            self.motions.is_empty() || (!self.moves(name) && has(&["Pa", "K", "m^3"])) || charged()
         };
         let states = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some() && holds(&s.name));
         states.map(|s| self.store_slot(Place::Store, format!("state:{}", s.name), &s.name, &s.derivative)).collect()
+    }
+
+    /// The electrical states of a circuit of first order: iron that saturates draws a current as a spring that stiffens draws a force.
+    pub(super) fn circuits(&self) -> Vec<Slot> {
+        if self.is_force_law() || !self.motions.is_empty() {
+            return Vec::new();
+        }
+        let electrical =
+            |name: &str| self.simulation.unit_of(name).is_some_and(|u| is_one_of(&u, &["Wb", "A", "C", "V"]));
+        let states = self.simulation.states.iter();
+        let states = states.filter(|s| self.original.state(&s.name).is_some() && electrical(&s.name));
+        states
+            .map(|s| {
+                let mut slot = self.store_slot(Place::Circuit, format!("state:{}", s.name), &s.name, &s.derivative);
+                slot.offer(self.simulation, "x", Expr::symbol(&s.name));
+                slot
+            })
+            .collect()
     }
 }

@@ -54,9 +54,12 @@ pub fn firmness(
         // A loop with unequal sides is a sum of plays and a curve: a curve at the same signal may be what another law of such loops has in one.
         let of_a_loop = own == Family::InputNonlinearity
             && best.effects.iter().any(|o| o.mechanism.family.members_imitate() && o.slot.label == e.slot.label);
+        // Plays of an input that is counted from elsewhere are those of the input and a constant: about what a loop is centred belongs to its law.
+        let of_its_middle = own == Family::Bias && best.effects.iter().any(|o| o.mechanism.family.members_imitate());
         let vague = own.stands_for_others()
             || of_plays
             || of_a_loop
+            || of_its_middle
             || of_turned_noise
             || of_rounding
             || of_a_spectrum

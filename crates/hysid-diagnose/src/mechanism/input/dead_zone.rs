@@ -29,7 +29,7 @@ pub static DEAD_ZONE: Mechanism = Mechanism {
     },
     contains: &[],
     confusable: &["coulomb_friction", "input_polynomial"],
-    needs: &[Need::Levels("u", 1.3)],
+    needs: &[Need::Levels("u", 1.3), Need::Below("u", 0.2)],
     sentence: "The input does nothing below {d_z}[ (and {d_n} on the other side)] {place}; the simulation has no dead zone.",
     signature: "No response to small inputs; the missing part of the input is a clipped copy of it.",
     reference: "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, Wiley (1996)",

@@ -8,7 +8,7 @@ pub static BILINEAR_STIFFNESS: Mechanism = Mechanism {
     id: "bilinear_stiffness",
     family: Family::AsymmetricStiffness,
     block: Block::Restoring,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Circuit],
     applies: |slot| slot.has("x"),
     already: &["max(x, 0)", "max(0, x)", "max(x - P, 0)", "max(0, x - P)", "step(x)*x", "x*step(x)"],
     law: |_, purpose| {

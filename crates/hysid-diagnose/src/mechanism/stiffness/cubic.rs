@@ -8,7 +8,7 @@ pub static CUBIC_STIFFNESS: Mechanism = Mechanism {
     id: "cubic_stiffness",
     family: Family::HardeningStiffness,
     block: Block::Restoring,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Circuit],
     applies: |slot| slot.has("x"),
     already: &["x^3", "x*x*x", "x*x^2", "x^2*x"],
     law: |_, _| Law::force("k_3*x^3").amplitude("k_3", "F/x^3", -1.0, 1.0),

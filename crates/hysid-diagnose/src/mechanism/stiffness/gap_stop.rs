@@ -8,7 +8,7 @@ pub static GAP_STOP: Mechanism = Mechanism {
     id: "gap_stop",
     family: Family::HardeningStiffness,
     block: Block::Restoring,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Circuit],
     applies: |slot| slot.has("x"),
     already: &["max(x - P, 0)", "max(0, x - P)", "max(abs(x) - P, 0)", "max(0, abs(x) - P)"],
     law: |_, _| {

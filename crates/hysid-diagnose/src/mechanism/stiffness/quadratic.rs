@@ -8,7 +8,7 @@ pub static QUADRATIC_STIFFNESS: Mechanism = Mechanism {
     id: "quadratic_stiffness",
     family: Family::AsymmetricStiffness,
     block: Block::Restoring,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Circuit],
     applies: |slot| slot.has("x"),
     already: &["x^2", "x*x"],
     law: |_, _| Law::force("k_2*x^2").amplitude("k_2", "F/x^2", -1.0, 1.0),

@@ -8,7 +8,7 @@ pub static QUINTIC_STIFFNESS: Mechanism = Mechanism {
     id: "quintic_stiffness",
     family: Family::HardeningStiffness,
     block: Block::Restoring,
-    places: &[Place::Force, Place::Connection, Place::ForceLaw],
+    places: &[Place::Force, Place::Connection, Place::ForceLaw, Place::Circuit],
     applies: |slot| slot.has("x"),
     already: &["x^5"],
     law: |_, _| Law::force("k_5*x^5").amplitude("k_5", "F/x^5", -0.5, 0.5),
