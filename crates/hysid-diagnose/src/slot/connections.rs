@@ -3,8 +3,8 @@
 use hysid_plant::{Expr, Simulation, State};
 
 use super::algebra::{coefficient, constant_coefficient, linear_coefficient, only_parameters, quotient, unless_one};
-use super::find::Finder;
-use super::motion::{Kinematic, Motion, force_of};
+use super::find::{Finder, is_one_of};
+use super::motion::{Kinematic, Motion, angle, force_of, kinematic};
 use super::{Place, Pull, Slot, Target};
 
 /// Whether a product is told with a minus.
@@ -251,6 +251,10 @@ impl Finder<'_> {
         slot.loops = self.loops(&v);
         slot.offer(self.simulation, "x", x);
         slot.offer(self.simulation, "v", v.clone());
+        let unit = |name: &str| self.simulation.unit_of(name);
+        slot.turns = unit(one.v)
+            .is_some_and(|u| kinematic(Some(&u), "") == Kinematic::Velocity && !is_one_of(&u, &["m/s"]))
+            || one.x.and_then(unit).as_ref().and_then(angle).is_some();
         let (force, divided) = force_of(self.simulation, one.derivative);
         let whole = |e: Expr| {
             let e = match divided {

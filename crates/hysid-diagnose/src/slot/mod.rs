@@ -157,6 +157,7 @@ pub struct Slot {
     loops: bool,
     mass: bool,
     feeds: bool,
+    turns: bool,
 }
 
 /// What a symbol of a law stands for at a slot.
@@ -200,6 +201,7 @@ impl Slot {
             loops: false,
             mass: false,
             feeds: false,
+            turns: false,
         }
     }
 
@@ -277,6 +279,11 @@ impl Slot {
     /// Whether the slot is a parameter by which a force is divided: a mass.
     pub(crate) fn is_mass(&self) -> bool {
         self.mass
+    }
+
+    /// Whether what is connected here turns, by its units.
+    pub(crate) fn turns(&self) -> bool {
+        self.turns
     }
 
     /// Whether the slot is a parameter that dissipates power: one that a velocity is multiplied by.

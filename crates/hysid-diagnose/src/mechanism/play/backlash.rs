@@ -1,6 +1,6 @@
 //! Backlash in the drive, the transmission or the sensor's coupling.
 
-use super::moved_play;
+use super::{in_a_coupling, moved_play};
 use crate::mechanism::path::with_duration;
 use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, log_steps};
 use crate::slot::Place;
@@ -11,23 +11,13 @@ pub static BACKLASH: Mechanism = Mechanism {
     family: Family::Play,
     block: Block::Hysteresis,
     places: &[Place::Input, Place::Between, Place::Command, Place::Sensor, Place::Connection],
-    applies: |slot| slot.place != Place::Connection || slot.has("k"),
+    applies: |slot| slot.place != Place::Connection || (slot.has("k") && slot.turns()),
     already: &["play(u, R)", "play(u + P, R)", "play(y, R)", "max(min(x, P), Q)"],
     law: |slot, purpose| {
         let signal = match slot.place {
             Place::Input | Place::Between | Place::Command => "u",
             Place::Sensor => "y",
-            // Between two masses the dead-zone form: no force inside the gap of the coupling.
-            _ => {
-                let gap = Grid::Reach("x", log_steps(0.02, 0.7, 6));
-                let open = |text: &str| Law::force(text).shape("r", "x", gap.clone()).within(0.0, 3.0).neutral(0.0);
-                return match purpose {
-                    Purpose::Screening => Law::force("-w*k*max(min(x, r), -r)").weight().shape("r", "x", gap),
-                    // What damps in the contact of the teeth does nothing between them.
-                    Purpose::Form(Form::Other) if slot.has("c") => open("-k*max(min(x, r), -r) - c*v*step(r - abs(x))"),
-                    Purpose::Refit | Purpose::Form(_) => open("-k*max(min(x, r), -r)"),
-                };
-            }
+            _ => return in_a_coupling(slot, purpose, "r"),
         };
         let width = Grid::Reach(signal, log_steps(0.005, 0.5, 6));
         let wide = |text: String| Law::replace(text).shape("r", signal, width.clone()).within(0.0, 3.0).neutral(0.0);

@@ -1,8 +1,24 @@
-//! Backlash, and how a play begins.
+//! Backlash, how a play begins, and the free play of a coupling.
 
 mod backlash;
 
+use super::{Form, Grid, Law, Purpose, log_steps};
+use crate::slot::Slot;
+
 pub use backlash::BACKLASH;
+
+/// Free play in what connects two parts, in its dead-zone form: no force within this half-width of the middle. A gear has backlash, a spring a clearance.
+pub(super) fn in_a_coupling(slot: &Slot, purpose: Purpose, width: &'static str) -> Law {
+    let gap = Grid::Reach("x", log_steps(0.02, 0.7, 6));
+    let open = |text: String| Law::force(text).shape(width, "x", gap.clone()).within(0.0, 3.0).neutral(0.0);
+    let missing = format!("k*max(min(x, {width}), -{width})");
+    match purpose {
+        Purpose::Screening => Law::force(format!("-w*{missing}")).weight().shape(width, "x", gap),
+        // What damps in the contact of the teeth does nothing between them.
+        Purpose::Form(Form::Other) if slot.has("c") => open(format!("-{missing} - c*v*step({width} - abs(x))")),
+        Purpose::Refit | Purpose::Form(_) => open(format!("-{missing}")),
+    }
+}
 
 /// A play of this half-width over `signal`, as text, that an input which came from `from` has moved by the first sample. Of its own a play came from 0: it
 /// begins without a width, where that input has left it. The first time is the time delayed by the whole recording, `T_r`.

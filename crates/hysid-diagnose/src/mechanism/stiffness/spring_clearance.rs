@@ -1,17 +1,25 @@
 //! Free play inside a spring: no force within a gap.
 
+use crate::mechanism::play::in_a_coupling;
 use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
+
+/// Why it is never firm between two parts.
+const ONE_LAW: &str = "between two parts the free play of a spring and the backlash of a coupling are one law";
 
 /// Free play inside a spring: no force within a gap.
 pub static SPRING_CLEARANCE: Mechanism = Mechanism {
     id: "spring_clearance",
     family: Family::Clearance,
     block: Block::Restoring,
-    places: &[Place::Force, Place::ForceLaw],
-    applies: |slot| slot.has("x") && slot.has("k"),
+    places: &[Place::Force, Place::ForceLaw, Place::Connection],
+    // Free play between two parts that turn is backlash.
+    applies: |slot| slot.has("x") && slot.has("k") && !(slot.place == Place::Connection && slot.turns()),
     already: &["max(min(x, P), Q)", "min(max(x, P), Q)"],
-    law: |_, purpose| {
+    law: |slot, purpose| {
+        if slot.place == Place::Connection {
+            return in_a_coupling(slot, purpose, "g").told_from(f64::INFINITY, "x", ONE_LAW);
+        }
         let gap = Grid::Quantiles("x", vec![0.1, 0.2, 0.35, 0.5, 0.7]);
         match purpose {
             Purpose::Screening => Law::force("-w*k*max(min(x, g), -g)").weight().shape("g", "x", gap),
