@@ -110,7 +110,7 @@ impl<'d> Judgement<'d> {
             0 => None,
             _ if runs_away => Some("what no free run can follow tells nothing of a set of effects"),
             _ => veto(&pool[0], least, best, [&blocks[0], &blocks[winner]])
-                .or_else(|| found_too_little(remaining.as_ref().filter(|_| unfinished()))),
+                .or_else(|| found_too_little(remaining.as_ref().filter(|_| unfinished()), search.options.alpha)),
         };
         if veto.is_some() {
             within = VerdictKind::Ambiguous;
