@@ -388,6 +388,15 @@ pub(super) mod tests {
         let driven = |spring: &str| slots_driven(road, Place::Connection, &[("q2", "w2", "m"), ("w2", spring, "m/s")]);
         assert!(driven("(n*(0.001*u - q2) - k*q2 - c*w2)/J").is_empty());
         let tyre = driven("(k*(0.001*u - q2) - c*w2)/J");
+        // Its free play is a clearance, that of a shaft is backlash.
+        let loose = |id: &str, states: &[(&str, &str, &str)]| {
+            let law = crate::mechanism::mechanism(id).unwrap();
+            slots_of(Place::Connection, states).iter().filter(|s| law.fits(s)).count()
+        };
+        let shaft = with(&[("w1", "(u - k*(q1 - q2))/J", rate), ("w2", "k*(q1 - q2)/J", rate)]);
+        let rod: Vec<_> = shaft.iter().map(|&(name, e, _)| (name, e, if name < "w" { "m" } else { "m/s" })).collect();
+        assert_eq!(["backlash", "spring_clearance"].map(|id| loose(id, &shaft)), [1, 0]);
+        assert_eq!(["backlash", "spring_clearance"].map(|id| loose(id, &rod)), [0, 1]);
         assert_eq!(tyre, [["q2 - 0.001*u", "w2 - 0.001*d(u)", "k", "-w2"].map(str::to_owned)]);
         assert!(slots(Place::Connection, &twisted("w1 + w2", "(u - k*z)/J", "-k*z/J")).is_empty());
     }

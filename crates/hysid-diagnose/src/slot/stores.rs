@@ -64,3 +64,38 @@ impl Finder<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::super::Structure;
+    use super::*;
+
+    /// The labels of the slots of a kind, of a simulation driven by a voltage with these states.
+    fn labels(place: Place, states: &str) -> Vec<String> {
+        let text = format!(
+            "[time]\nperiod_s = 1e-4\n[inputs]\ne = \"source_V\"\n[parameters]\nR = {{ value = 2.0, min = 0.1, unit = \"ohm\" }}\n\
+             L = {{ value = 0.5, min = 0.1, unit = \"H\" }}\nC = {{ value = 1e-3, min = 1e-4, unit = \"F\" }}\n[states]\n{states}[outputs]\ny = \"s\"\n"
+        );
+        let simulation = Simulation::parse(&text, "circuit.sim.toml").unwrap();
+        let slots = Structure::of(&simulation).slots.into_iter().filter(|s| s.place == place);
+        slots
+            .map(|s| format!("{} {}", s.label, s.quantity("x").map_or("-".into(), |q| q.expression.to_string())))
+            .collect()
+    }
+
+    #[test]
+    fn a_circuit_of_first_order_has_a_law_of_its_own() {
+        let flux = "s = { derivative = \"e - R*s/L\", initial = 0.0, unit = \"Wb\" }\n";
+        assert_eq!(labels(Place::Circuit, flux), ["state:s s"]);
+        let heat = "s = { derivative = \"0.1*(20 - s)\", initial = 0.0, unit = \"K\" }\n";
+        assert!(labels(Place::Circuit, heat).is_empty());
+        assert_eq!(labels(Place::Store, heat), ["state:s -"]);
+        // A current that charges a capacitor is a motion, whose spring the capacitor is; what it holds may leak.
+        let resonant = "i = { derivative = \"(e - R*i - s)/L\", initial = 0.0, unit = \"A\" }\ns = { derivative = \"i/C\", initial = 0.0, unit = \"V\" }\n";
+        assert!(labels(Place::Circuit, resonant).is_empty());
+        assert_eq!(labels(Place::Force, resonant), ["state:i s"]);
+        assert_eq!(labels(Place::Store, resonant), ["state:s -"]);
+    }
+}

@@ -21,6 +21,10 @@ const BY_CHANCE: f64 = 0.05;
 /// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
 const AS_MUCH: f64 = 0.5;
 const FAR_MORE: f64 = 5.0;
+/// Share of what the simulation as it is leaves, noise and all, below which a set is no imitation, whatever generic terms add: of a recording that is a
+/// thousand times louder than its noise no law takes all (Silverbox: a cubic spring and a quadratic one leave a twentieth, in which terms find half as
+/// much evidence again).
+const HARDLY_ANY: f64 = 0.1;
 /// Share of a set's evidence from which generic terms, on the tangent, are worth a fit in its place. Where the mismatch is large the tangent shows but a
 /// part of what a term explains once it stands in the equations.
 const WORTH_A_FIT: f64 = 0.25;
@@ -59,13 +63,14 @@ impl<'d> Remaining<'d> {
         let seen = open.as_ref().filter(|o| o.by_chance(ODDS_AGAINST_MORE) < alpha);
         let explained = best.log_evidence - none.log_evidence;
         let spectrum = is_a_spectrum(best);
-        let generic = if winner > 0 { search.open(none) } else { None };
+        let imitates = winner > 0 && best.base.unexplained() > HARDLY_ANY.powi(2) * none.base.unexplained();
+        let generic = if imitates || spectrum { search.open(none) } else { None };
         let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
-        let outdone = generic.as_ref().is_some_and(outdone);
+        let outdone = imitates && generic.as_ref().is_some_and(outdone);
         let (swapped, tried) =
-            if winner > 0 && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { (None, None) };
+            if imitates && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { (None, None) };
         let outdone = outdone || swapped.is_some();
-        let foreign = winner > 0 && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
+        let foreign = imitates && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
         // What was not looked at is not known to be nothing.
         let significant = |t: &SurrogateTest| t.p_value < alpha;
         let imperfect = winner > 0 && (foreign || spectrum || seen.is_some() || test.as_ref().is_none_or(significant));
@@ -212,8 +217,11 @@ fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {
 /// Share of the mismatch, above the noise, that a set leaves.
 fn share(best: &Hypothesis<'_>, none: &Hypothesis<'_>) -> f64 {
     let layout = &best.base.model.data().layout;
-    let noise = noise_floor(best);
-    let left = |e: &[f64]| layout.rms(e).iter().zip(&noise).map(|(r, n)| (r * r - n * n).max(0.0)).sum::<f64>();
+    let (noise, scales) = (noise_floor(best), best.base.model.data().scales());
+    let left = |e: &[f64]| {
+        let outputs = layout.rms(e).into_iter().zip(&noise).zip(&scales);
+        outputs.map(|((r, n), scale)| (r * r - n * n).max(0.0) / (scale * scale)).sum::<f64>()
+    };
     let share = (left(&best.base.fit.residual) / left(&none.base.fit.residual).max(f64::MIN_POSITIVE)).sqrt().min(1.0);
     if share.is_finite() { share } else { 0.0 }
 }

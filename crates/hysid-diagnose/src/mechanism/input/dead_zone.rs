@@ -34,3 +34,24 @@ pub static DEAD_ZONE: Mechanism = Mechanism {
     signature: "No response to small inputs; the missing part of the input is a clipped copy of it.",
     reference: "G. Tao, P. V. Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, Wiley (1996)",
 };
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::mechanism::Signals;
+
+    #[test]
+    fn what_is_never_small_has_an_offset_and_no_dead_zone() {
+        let offered = |u: &[f64]| {
+            let signals = Signals::new(0.01, 0.0, BTreeMap::from([("u".to_owned(), u.to_vec())]));
+            DEAD_ZONE.is_written_from(&signals)
+        };
+        assert!(!offered(&[30.0, 70.0, 101.0, 50.0]));
+        assert!(!offered(&[-30.0, -70.0, -101.0, -50.0]));
+        assert!(offered(&[3.0, 70.0, 101.0, 50.0]));
+        // It passes through nothing between two samples.
+        assert!(offered(&[-60.0, 70.0, 101.0, 50.0]));
+    }
+}
