@@ -45,6 +45,9 @@ pub(super) fn told(text: &str, file: &DiagnosisFile) -> String {
 /// What an engineer does with this verdict.
 pub(super) fn next_step(file: &DiagnosisFile) -> &'static str {
     match file.verdict {
+        VerdictKind::NoSignificantMismatch if file.fit.iter().any(|f| f.outdone().is_some()) => {
+            "Do not trust this verdict: a model without physics predicts the hold-out far better than the simulation. Look at the residual below, and record the same input twice: what repeats is no noise."
+        }
         VerdictKind::NoSignificantMismatch => {
             "Nothing needs to be added: keep the simulation with the recalibrated parameters below. An effect can still be hidden where it is smaller than the recording would have shown; see the table."
         }

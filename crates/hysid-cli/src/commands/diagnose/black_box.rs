@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use hysid::identify::{Columns, Decimate, Factors, FitReport, IdentifyError, Options, Source, Stop, identify_until};
 use hysid_diagnose::answer::picture::{Picture, RecordPicture, Role};
-use hysid_diagnose::file::DiagnosisFile;
+use hysid_diagnose::file::{DiagnosisFile, FitRecord, VerdictKind};
 use hysid_narx::NarxModel;
 use hysid_plant::Simulation;
 use hysid_signal::{Channel, Clock, Recording};
@@ -94,6 +94,19 @@ pub fn score(file: &mut DiagnosisFile, models: Models, picture: &Picture, simula
             }
         }
     }
+    if file.verdict == VerdictKind::NoSignificantMismatch {
+        let told: Vec<String> = file.fit.iter().filter_map(contradicted).collect();
+        file.notes.extend(told);
+    }
+}
+
+/// What speaks against a verdict that nothing is missing. The verdict stays, since the hold-out decides nothing.
+fn contradicted(fit: &FitRecord) -> Option<String> {
+    let share = fit.outdone()?;
+    Some(format!(
+        "on {} a black box leaves {share:.2} of the simulation's error of `{}`: something is missing after all, which no mechanism of the catalogue explains and which passed for noise on the recordings for estimation",
+        fit.recording, fit.output
+    ))
 }
 
 /// The model of `hysid fit`, found in a narrower search: linear models decide on rate and lags, then families compete at these lags only.
@@ -267,6 +280,27 @@ mod tests {
         assert_eq!(error(&r, &y, None), Some((25.0f64 / 3.0).sqrt()));
         assert_eq!(error(&r, &[nan; 10], Some(4)), None);
         assert_eq!(error(&r, &[nan; 10], None), None);
+    }
+
+    #[test]
+    fn a_black_box_that_is_far_better_contradicts_the_verdict() {
+        let told = |before: Option<f64>, black_box: Option<f64>| {
+            contradicted(&FitRecord {
+                recording: "val.csv".into(),
+                output: "h_m".into(),
+                rmse_before: before,
+                rmse_after: None,
+                ratio: None,
+                ratio_low: None,
+                ratio_high: None,
+                rmse_black_box: black_box,
+            })
+        };
+        let words = told(Some(0.056), Some(0.023)).unwrap();
+        assert!(words.contains("val.csv") && words.contains("0.41") && words.contains("`h_m`"), "{words}");
+        assert_eq!(told(Some(0.056), Some(0.05)), None);
+        assert_eq!(told(Some(0.056), None), None);
+        assert_eq!(told(None, Some(0.05)), None);
     }
 
     #[test]
