@@ -13,14 +13,13 @@ pub mod hypothesis;
 mod predicting;
 mod unknowns;
 
-use hysid_plant::{Compiled, Direction, Expr, Initial, Observer, Run, Sensitivity, Simulation, Start};
+use hysid_plant::{Compiled, Direction, Initial, Observer, Run, Sensitivity, Simulation, Start};
 use rayon::prelude::*;
 
 use crate::data::DataSet;
 use crate::refit::Problem;
 pub use along::along;
 use predicting::Corrections;
-use unknowns::slope;
 pub use unknowns::{Count, Unknown, Values};
 
 /// A compiled simulation on a data set.
@@ -112,105 +111,6 @@ impl<'d> Model<'d> {
         match self.unknowns.get(place)? {
             Unknown::Parameter(i) => self.compiled.parameters().get(*i).map(|p| p.name.as_str()),
             Unknown::Initial { .. } => None,
-        }
-    }
-
-    /// A `theta` from values by name; where there is none, the document's value, and the first measurement of an output that *is*
-    /// the state, or the slope of the first ones of which it is the derivative, else zero, for an initial value.
-    pub fn theta(&self, values: &Values) -> Vec<f64> {
-        self.unknowns
-            .iter()
-            .enumerate()
-            .map(|(place, u)| match u {
-                Unknown::Parameter(i) => {
-                    let p = &self.compiled.parameters()[*i];
-                    values
-                        .parameters
-                        .get(&p.name)
-                        .copied()
-                        .unwrap_or(p.value)
-                        .clamp(self.bounds[place].0, self.bounds[place].1)
-                }
-                Unknown::Initial { stretch, state } => {
-                    let name = &self.simulation().states[*state].name;
-                    values
-                        .initials
-                        .get(&(*stretch, name.clone()))
-                        .copied()
-                        .unwrap_or_else(|| self.measured_start(*stretch, name))
-                }
-            })
-            .collect()
-    }
-
-    fn measured_start(&self, stretch: usize, state: &str) -> f64 {
-        let simulation = self.simulation();
-        let measured = |state: &str| {
-            let is = |e: &Expr| matches!(e, Expr::Symbol(s) if s == state);
-            let output = simulation.outputs.iter().position(|o| is(&o.expression))?;
-            Some(self.data.stretches[stretch].outputs[output].as_slice())
-        };
-        if let Some(y) = measured(state) {
-            return y.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
-        }
-        let integral = simulation.states.iter().find(|s| matches!(&s.derivative, Expr::Symbol(v) if v == state));
-        integral
-            .and_then(|x| measured(&x.name))
-            .map_or(0.0, |y| slope(y) / self.data.stretches[stretch].drive.period_s())
-    }
-
-    /// The values by name of a `theta`, fixed parameters included.
-    pub fn values(&self, theta: &[f64]) -> Values {
-        let mut values = Values::default();
-        for p in self.compiled.parameters() {
-            values.parameters.insert(p.name.clone(), p.value);
-        }
-        for (u, &x) in self.unknowns.iter().zip(theta) {
-            match u {
-                Unknown::Parameter(i) => {
-                    values.parameters.insert(self.compiled.parameters()[*i].name.clone(), x);
-                }
-                Unknown::Initial { stretch, state } => {
-                    values.initials.insert((*stretch, self.simulation().states[*state].name.clone()), x);
-                }
-            }
-        }
-        values
-    }
-
-    /// The parameters in the document's order; `set` overrides some by name, fixed ones too.
-    fn parameters(&self, theta: &[f64], set: &[(String, f64)]) -> Vec<f64> {
-        let mut all = self.compiled.theta();
-        for (name, x) in set {
-            if let Some(i) = self.compiled.parameter_index(name) {
-                all[i] = *x;
-            }
-        }
-        for (u, &x) in self.unknowns.iter().zip(theta) {
-            if let Unknown::Parameter(i) = u {
-                all[*i] = x;
-            }
-        }
-        all
-    }
-
-    /// The start of a stretch: free values (in order of the free states) or all states.
-    pub fn start_of(&self, stretch: usize, theta: &[f64]) -> Vec<f64> {
-        let mine = |state: usize| {
-            self.unknowns.iter().position(|u| *u == Unknown::Initial { stretch, state }).map(|place| theta[place])
-        };
-        let states = &self.simulation().states;
-        if self.from_document[stretch] {
-            (0..states.len()).filter_map(mine).collect()
-        } else {
-            (0..states.len())
-                .map(|s| {
-                    mine(s).unwrap_or(match states[s].initial {
-                        Initial::Number(x) => x,
-                        _ => 0.0,
-                    })
-                })
-                .collect()
         }
     }
 

@@ -1,14 +1,15 @@
-//! The slots between two moving parts: of two displacements, of a deflection that is a state of its own, of a part and a motion that is prescribed.
+//! The slots between two moving parts: of two displacements, of a deflection that is a state of its own.
 
 use hysid_plant::{Expr, Simulation, State};
 
 use super::algebra::{coefficient, constant_coefficient, linear_coefficient, only_parameters, quotient, unless_one};
-use super::find::{Finder, is_one_of};
-use super::motion::{Kinematic, Motion, angle, force_of, kinematic};
+use super::find::Finder;
+use super::motion::{Motion, angle, force_of};
+use super::turn::is_rate_of_turn;
 use super::{Place, Pull, Slot, Target};
 
 /// Whether a product is told with a minus.
-fn is_negative(product: &Expr) -> bool {
+pub(super) fn is_negative(product: &Expr) -> bool {
     signed(product.clone()).0
 }
 
@@ -22,26 +23,24 @@ fn signed(product: Expr) -> (bool, Expr) {
 }
 
 /// The terms of the force on a part, each with its sign.
-fn forces_of<'e>(simulation: &Simulation, motion: &Motion<'e>) -> impl Iterator<Item = (f64, &'e Expr)> {
+pub(super) fn forces_of<'e>(simulation: &Simulation, motion: &Motion<'e>) -> impl Iterator<Item = (f64, &'e Expr)> {
     force_of(simulation, motion.derivative).0.terms().into_iter()
 }
 
 /// What connects two parts.
-struct Stretch<'a> {
+pub(super) struct Stretch<'a> {
     /// The deflection.
-    x: Expr,
+    pub x: Expr,
     /// Its rate.
-    v: Expr,
+    pub v: Expr,
     /// A symbol that the force on the first part is linear in, where the connection is.
-    symbol: &'a str,
-    /// The sign of the spring rate there.
-    sign: f64,
+    pub symbol: &'a str,
     /// What the first part feels of the force, where that is not all of it.
-    lever: Option<Expr>,
+    pub lever: Option<Expr>,
     /// The part at its other end; none where that is a motion which an input prescribes.
-    other: Option<&'a Motion<'a>>,
+    pub other: Option<&'a Motion<'a>>,
     /// Where it is, for people.
-    words: String,
+    pub words: String,
 }
 
 impl Finder<'_> {
@@ -67,7 +66,6 @@ impl Finder<'_> {
                         x: of(Expr::symbol(x1)) - Expr::symbol(x2),
                         v: of(one.rate()) - other.rate(),
                         symbol: x2,
-                        sign: 1.0,
                         lever: ratio.clone(),
                         other: Some(other),
                         words: format!("between {x1} and {x2}"),
@@ -77,7 +75,7 @@ impl Finder<'_> {
             }
         }
         slots.extend(self.twists());
-        slots.extend(self.bases());
+        slots.extend(self.grounds());
         slots.extend(elements);
         slots
     }
@@ -120,7 +118,6 @@ impl Finder<'_> {
                 x: Expr::symbol(x),
                 v: one.rate(),
                 symbol: x,
-                sign: -1.0,
                 lever,
                 other: Some(other),
                 words: format!("in {x}, which pulls at {} coordinates", pulls.len()),
@@ -141,61 +138,6 @@ impl Finder<'_> {
             })
             .collect();
         (!all.is_empty()).then_some(all)
-    }
-
-    /// Connections with a motion that an input prescribes, as the ground under a structure: a force that holds a velocity and the rate of the input
-    /// together, or a spring between the two, as a tyre. A controller's gain is known, a spring's rate is not.
-    fn bases(&self) -> Vec<Slot> {
-        let mut slots = Vec::new();
-        for one in &self.motions {
-            let Some(x) = one.x.filter(|x| one.derivative.uses(x)) else { continue };
-            for input in &self.simulation.inputs {
-                let rate = Expr::symbol(&input.symbol).derivative_of_input();
-                let holds_rate = |term: &Expr| {
-                    let mut found = false;
-                    term.visit(&mut |e| found |= *e == rate);
-                    found && term.uses(one.v)
-                };
-                let of_input =
-                    |scale: Option<&Expr>, e: Expr| scale.map_or(e.clone(), |scale| scale.clone() * e.clone());
-                let scale = self.travel(one, x, &input.symbol);
-                if scale.is_none() && !forces_of(self.simulation, one).any(|(_, term)| holds_rate(term)) {
-                    continue;
-                }
-                let scale = scale.and_then(unless_one);
-                let stretch = Stretch {
-                    x: Expr::symbol(x) - of_input(scale.as_ref(), Expr::symbol(&input.symbol)),
-                    v: one.rate() - of_input(scale.as_ref(), rate),
-                    symbol: &input.symbol,
-                    sign: 1.0,
-                    lever: None,
-                    other: None,
-                    words: format!("between {x} and {}", input.symbol),
-                };
-                let mut slot = self.connection(one, stretch);
-                // The spring's rate is for each unit of the displacement, which the input may count in another.
-                if let Some((k, scale)) = slot.quantity("k").map(|q| q.expression.clone()).zip(scale) {
-                    slot.offer(self.simulation, "k", quotient(k, scale));
-                }
-                slots.push(slot);
-            }
-        }
-        slots
-    }
-
-    /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too: `0.001` of a road in mm.
-    fn travel(&self, one: &Motion<'_>, x: &str, input: &str) -> Option<Expr> {
-        if self.kinematic_input(input) != Kinematic::Displacement {
-            return None;
-        }
-        forces_of(self.simulation, one).find_map(|(_, term)| {
-            let [held, given] = [x, input].map(|s| constant_coefficient(self.simulation, term, s));
-            let (held, given) = (held?, given?);
-            let estimated = |s: &String| self.simulation.parameter(s).is_some_and(|p| !p.fixed);
-            let scale = quotient(-given, held.clone());
-            (held.symbols().iter().any(estimated) && scale.symbols().is_empty() && !is_negative(&scale))
-                .then_some(scale)
-        })
     }
 
     /// What a connection takes of the first displacement for each unit of the second where that is not one, as a gear has it: the terms of the
@@ -231,7 +173,6 @@ impl Finder<'_> {
                 x: Expr::symbol(name),
                 v: rate.clone(),
                 symbol: name,
-                sign: -1.0,
                 lever: unless_one(quotient(-first, second)),
                 other: Some(other),
                 words: format!("across {name}"),
@@ -243,18 +184,17 @@ impl Finder<'_> {
     }
 
     /// The force between two parts, over the deflection of what connects them.
-    fn connection(&self, one: &Motion<'_>, stretch: Stretch<'_>) -> Slot {
-        let Stretch { x, v, symbol, sign, lever, other, words } = stretch;
+    pub(super) fn connection(&self, one: &Motion<'_>, stretch: Stretch<'_>) -> Slot {
+        let Stretch { x, v, symbol, lever, other, words } = stretch;
         let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.state, 1.0) }];
         pulls.extend(other.map(|other| Pull::new(other.state, -1.0)));
         let mut slot = Slot::new(Place::Connection, format!("state:{}", one.state), words, Target::Derivatives(pulls));
         slot.loops = self.loops(&v);
-        slot.offer(self.simulation, "x", x);
+        slot.offer(self.simulation, "x", x.clone());
         slot.offer(self.simulation, "v", v.clone());
         let unit = |name: &str| self.simulation.unit_of(name);
-        slot.turns = unit(one.v)
-            .is_some_and(|u| kinematic(Some(&u), "") == Kinematic::Velocity && !is_one_of(&u, &["m/s"]))
-            || one.x.and_then(unit).as_ref().and_then(angle).is_some();
+        slot.turns =
+            unit(one.v).is_some_and(|u| is_rate_of_turn(&u)) || one.x.and_then(unit).as_ref().and_then(angle).is_some();
         let (force, divided) = force_of(self.simulation, one.derivative);
         let whole = |e: Expr| {
             let e = match divided {
@@ -268,13 +208,17 @@ impl Finder<'_> {
         if let Some(size) = coupling.map(|(_, t)| t.clone().abs()).reduce(|a, b| a + b) {
             slot.offer(self.simulation, "F", whole(size));
         }
-        if let Some(k) = linear_coefficient(self.simulation, force, symbol) {
-            slot.offer(self.simulation, "k", whole(if sign < 0.0 { -k } else { k }));
+        // For each unit of the deflection or of its rate, which may count a symbol in another unit.
+        let rate = |symbol: &str, within: &Expr| {
+            let rate = linear_coefficient(self.simulation, force, symbol)?;
+            let count = constant_coefficient(self.simulation, within, symbol);
+            Some(whole(count.map_or(rate.clone(), |count| quotient(rate, -count))))
+        };
+        if let Some(k) = rate(symbol, &x) {
+            slot.offer(self.simulation, "k", k);
         }
-        if let Some(c) = other.and_then(|other| linear_coefficient(self.simulation, force, other.v)) {
-            // For each unit of the rate, which may count the second velocity in another unit.
-            let count = other.and_then(|other| constant_coefficient(self.simulation, &v, other.v));
-            slot.offer(self.simulation, "c", whole(count.map_or(c.clone(), |count| quotient(c, -count))));
+        if let Some(c) = other.and_then(|other| rate(other.v, &v)) {
+            slot.offer(self.simulation, "c", c);
         }
         slot.context = vec![one.derivative.clone()];
         slot.offer_own_sign(self.simulation);
@@ -293,7 +237,7 @@ pub(super) mod tests {
     }
 
     /// The same with an input from this column.
-    fn slots_driven(column: &str, place: Place, states: &[(&str, &str, &str)]) -> Vec<[String; 4]> {
+    pub fn slots_driven(column: &str, place: Place, states: &[(&str, &str, &str)]) -> Vec<[String; 4]> {
         let told = |slot: &Slot| {
             let of = |symbol: &str| slot.quantity(symbol).map_or(String::new(), |q| q.expression.to_string());
             let Target::Derivatives(pulls) = &slot.target else { panic!("{}", slot.label) };
@@ -348,8 +292,6 @@ pub(super) mod tests {
         let milli = twisted("1000*(w1 - w2)", "(u - k*z - c*(w1 - w2))/J", "(k*z + c*(w1 - w2))/J");
         let damping = slots_of(Place::Connection, &milli)[0].quantity("c").map(|q| q.expression.to_string());
         assert_eq!(damping.as_deref(), Some("c/1000"));
-        let based = [("q2", "w2", rad), ("w2", "(k*(u - q2) + c*(d(u) - w2))/J", rate)];
-        check(&based, ["q2 - u", "w2 - d(u)", "k", "-w2"]);
         // Drifts of storeys: what an element pulls with stands in the equations of its neighbours.
         let drifts = [
             ("d1", "v1", "m"),
@@ -382,13 +324,7 @@ pub(super) mod tests {
             slots(Place::Connection, &stiffened).iter().map(|s| &s[..2]).collect::<Vec<_>>(),
             [["d1", "v1"], ["d2", "v2"]]
         );
-        // A controller's reference is no ground.
-        assert!(slots(Place::Connection, &[based[0], ("w2", "(k*(u - q2) - c*w2)/J", rate)]).is_empty());
-        let road = "road_mm";
-        let driven = |spring: &str| slots_driven(road, Place::Connection, &[("q2", "w2", "m"), ("w2", spring, "m/s")]);
-        assert!(driven("(n*(0.001*u - q2) - k*q2 - c*w2)/J").is_empty());
-        let tyre = driven("(k*(0.001*u - q2) - c*w2)/J");
-        // Its free play is a clearance, that of a shaft is backlash.
+        // The free play of a rod is a clearance, that of a shaft is backlash.
         let loose = |id: &str, states: &[(&str, &str, &str)]| {
             let law = crate::mechanism::mechanism(id).unwrap();
             slots_of(Place::Connection, states).iter().filter(|s| law.fits(s)).count()
@@ -397,7 +333,6 @@ pub(super) mod tests {
         let rod: Vec<_> = shaft.iter().map(|&(name, e, _)| (name, e, if name < "w" { "m" } else { "m/s" })).collect();
         assert_eq!(["backlash", "spring_clearance"].map(|id| loose(id, &shaft)), [1, 0]);
         assert_eq!(["backlash", "spring_clearance"].map(|id| loose(id, &rod)), [0, 1]);
-        assert_eq!(tyre, [["q2 - 0.001*u", "w2 - 0.001*d(u)", "k", "-w2"].map(str::to_owned)]);
         assert!(slots(Place::Connection, &twisted("w1 + w2", "(u - k*z)/J", "-k*z/J")).is_empty());
     }
 }

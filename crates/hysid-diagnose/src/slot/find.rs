@@ -62,6 +62,11 @@ pub(super) fn is_one_of(unit: &Unit, names: &[&str]) -> bool {
     names.iter().filter_map(|name| Unit::parse(name).ok()).any(|u| u.same_dimension(unit))
 }
 
+/// Whether a unit is known and measures the same as one of these.
+pub(super) fn has_unit(unit: Option<Unit>, names: &[&str]) -> bool {
+    unit.is_some_and(|u| is_one_of(&u, names))
+}
+
 /// Looks for the slots of each kind.
 pub(super) struct Finder<'a> {
     pub simulation: &'a Simulation,
@@ -247,7 +252,7 @@ impl Finder<'_> {
     fn current_through(&self, parameter: &str) -> Option<&str> {
         let resists = |s: &&State| {
             let (voltage, inductance) = force_of(self.simulation, &s.derivative);
-            self.simulation.unit_of(&s.name).is_some_and(|u| is_one_of(&u, &["A"]))
+            has_unit(self.simulation.unit_of(&s.name), &["A"])
                 && linear_coefficient(self.simulation, voltage, &s.name).is_some_and(|c| c.uses(parameter))
                 && !inductance.is_some_and(|l| l.uses(parameter))
         };
@@ -256,8 +261,7 @@ impl Finder<'_> {
                 linear_coefficient(self.simulation, force_of(self.simulation, e).0, symbol)
                     .is_some_and(|c| c.uses(parameter))
             };
-            self.simulation.unit_of(symbol).is_some_and(|u| is_one_of(&u, &["A"]))
-                && self.equations().iter().any(through)
+            has_unit(self.simulation.unit_of(symbol), &["A"]) && self.equations().iter().any(through)
         };
         let state = self.simulation.states.iter().find(resists).map(|s| s.name.as_str());
         state.or_else(|| self.simulation.inputs.iter().map(|i| i.symbol.as_str()).find(recorded))

@@ -1,10 +1,10 @@
 //! The slots at which forces stand: on a moving part, at the output of a static force law.
 
-use hysid_plant::{Expr, Output, State, Unit};
+use hysid_plant::{Expr, Output, State};
 
 use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, quotient, size};
 use super::balance::is_scaled;
-use super::find::{Finder, is_one_of};
+use super::find::{Finder, has_unit, is_one_of};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
 use super::{Place, Pull, Slot, Target};
 
@@ -145,12 +145,11 @@ impl Finder<'_> {
     /// The laws by which windings draw current: over the flux linkage as a force over a displacement, whose velocity is the voltage. The current of the
     /// law is not fed back to the voltage across the winding's resistance, which a measured core makes small.
     pub(super) fn core_laws(&self) -> Vec<Slot> {
-        let has_unit = |unit: Option<Unit>, wanted: &str| unit.is_some_and(|u| is_one_of(&u, &[wanted]));
         let flux =
-            |s: &&State| has_unit(self.simulation.unit_of(&s.name), "Wb") && self.original.state(&s.name).is_some();
+            |s: &&State| has_unit(self.simulation.unit_of(&s.name), &["Wb"]) && self.original.state(&s.name).is_some();
         let fluxes: Vec<&State> = self.simulation.states.iter().filter(flux).collect();
         let currents = self.simulation.outputs.iter();
-        let currents = currents.filter(|o| has_unit(self.unit_of_output(&o.column, &o.expression), "A"));
+        let currents = currents.filter(|o| has_unit(self.unit_of_output(&o.column, &o.expression), &["A"]));
         currents
             .flat_map(|o| fluxes.iter().filter(|s| o.expression.uses(&s.name)).map(move |s| (o, *s)))
             .map(|(o, s)| self.force_law(o, Some(&s.name), s.derivative.clone()))

@@ -17,6 +17,7 @@ mod commands;
 mod connections;
 mod find;
 mod forces;
+mod grounds;
 mod loops;
 mod motion;
 mod pattern;

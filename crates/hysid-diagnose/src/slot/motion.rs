@@ -3,8 +3,8 @@
 use hysid_plant::{BinaryOp, Expr, Simulation, State, Unit};
 
 use super::algebra::{constant_coefficient, only_parameters};
-use super::find::is_one_of;
-use super::turn::is_turn;
+use super::find::{has_unit, is_one_of};
+use super::turn::{is_rate_of_turn, is_turn};
 
 /// How forces enter the derivative of a velocity.
 pub(crate) enum ForcePath<'a> {
@@ -94,7 +94,7 @@ pub(super) fn kinematic(unit: Option<&Unit>, name: &str) -> Kinematic {
     };
     if is_one_of(unit, &["m"]) || angle(unit).is_some() {
         Kinematic::Displacement
-    } else if is_one_of(unit, &["m/s"]) || matches!(unit.to_string().as_str(), "rad/s" | "deg/s" | "rev/s" | "rpm") {
+    } else if is_one_of(unit, &["m/s"]) || is_rate_of_turn(unit) {
         Kinematic::Velocity
     } else {
         Kinematic::Neither
@@ -112,16 +112,16 @@ pub(super) fn angle(unit: &Unit) -> Option<Expr> {
     }
 }
 
+/// Units of what a capacitor has.
+pub(super) const CHARGED: &[&str] = &["C", "V"];
+
 /// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name, or a capacitor that
 /// a current charges.
 fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Expr> {
     let others = |s: &String| s != velocity && s != "pi" && simulation.parameter(s).is_none();
-    let unit = simulation.unit_of(&position.name);
-    let charged = || {
-        let current = simulation.unit_of(velocity).is_some_and(|u| is_one_of(&u, &["A"]));
-        current && unit.as_ref().is_some_and(|u| is_one_of(u, &["V", "C"]))
-    };
-    let moved = kinematic(unit.as_ref(), &position.name) == Kinematic::Displacement || charged();
+    let unit = || simulation.unit_of(&position.name);
+    let charged = || has_unit(simulation.unit_of(velocity), &["A"]) && has_unit(unit(), CHARGED);
+    let moved = kinematic(unit().as_ref(), &position.name) == Kinematic::Displacement || charged();
     if position.derivative.symbols().iter().any(others) || !moved {
         return None;
     }

@@ -2,7 +2,8 @@
 
 use hysid_plant::Expr;
 
-use super::find::{Finder, is_one_of};
+use super::find::{Finder, has_unit};
+use super::motion::CHARGED;
 use super::pattern::roots;
 use super::{Place, Pull, Slot, Target};
 
@@ -32,36 +33,35 @@ impl Finder<'_> {
     }
 
     pub(super) fn stores(&self) -> Vec<Slot> {
-        if self.is_force_law() {
-            return Vec::new();
-        }
         // Beside a motion a state may be a controller's or a filter's: only what has the unit of something held is a store.
         // A capacitor is one even where its charge plays the part of a displacement.
-        let holds = |name: &str| {
-            let has = |units: &[&str]| self.simulation.unit_of(name).is_some_and(|u| is_one_of(&u, units));
-            let charged = || self.motions.iter().any(|m| m.x == Some(name)) && has(&["C", "V"]);
+        self.held(Place::Store, |name| {
+            let has = |units: &[&str]| has_unit(self.simulation.unit_of(name), units);
+            let charged = || self.motions.iter().any(|m| m.x == Some(name)) && has(CHARGED);
             self.motions.is_empty() || (!self.moves(name) && has(&["Pa", "K", "m^3"])) || charged()
-        };
-        let states = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some() && holds(&s.name));
-        states.map(|s| self.store_slot(Place::Store, format!("state:{}", s.name), &s.name, &s.derivative)).collect()
+        })
     }
 
     /// The electrical states of a circuit of first order: iron that saturates draws a current as a spring that stiffens draws a force.
     pub(super) fn circuits(&self) -> Vec<Slot> {
-        if self.is_force_law() || !self.motions.is_empty() {
+        let mut slots = self.held(Place::Circuit, |name| {
+            self.motions.is_empty() && has_unit(self.simulation.unit_of(name), &["Wb", "A", "C", "V"])
+        });
+        for slot in &mut slots {
+            if let Some(held) = slot.quantity("s").cloned() {
+                slot.offer(self.simulation, "x", held.expression);
+            }
+        }
+        slots
+    }
+
+    /// The slots of those of the user's states that hold something.
+    fn held(&self, place: Place, holds: impl Fn(&str) -> bool) -> Vec<Slot> {
+        if self.is_force_law() {
             return Vec::new();
         }
-        let electrical =
-            |name: &str| self.simulation.unit_of(name).is_some_and(|u| is_one_of(&u, &["Wb", "A", "C", "V"]));
-        let states = self.simulation.states.iter();
-        let states = states.filter(|s| self.original.state(&s.name).is_some() && electrical(&s.name));
-        states
-            .map(|s| {
-                let mut slot = self.store_slot(Place::Circuit, format!("state:{}", s.name), &s.name, &s.derivative);
-                slot.offer(self.simulation, "x", Expr::symbol(&s.name));
-                slot
-            })
-            .collect()
+        let states = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some() && holds(&s.name));
+        states.map(|s| self.store_slot(place, format!("state:{}", s.name), &s.name, &s.derivative)).collect()
     }
 }
 

@@ -24,6 +24,11 @@ fn radians_per_second(unit: &Unit) -> Option<f64> {
     }
 }
 
+/// Whether a unit is that of the speed of something that turns.
+pub(super) fn is_rate_of_turn(unit: &Unit) -> bool {
+    radians_per_second(unit).is_some()
+}
+
 /// The same simulation with an angle, in rad, for each speed of something that turns and has none.
 pub(crate) fn with_turns(simulation: &Simulation) -> Simulation {
     let mut out = simulation.clone();

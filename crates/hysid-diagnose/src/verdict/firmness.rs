@@ -3,7 +3,7 @@
 use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights, stretched};
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::mechanism::{Family, catalogue};
-use crate::model::hypothesis::{Hypothesis, OnBlocks, best_that_says};
+use crate::model::hypothesis::{Effect, Hypothesis, OnBlocks, best_that_says};
 
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
@@ -37,6 +37,7 @@ pub fn firmness(
     // A set that leaves something significant may stand in for something else; what is still far from the recording is not understood,
     // whatever was gained; and three members imitate almost anything: on development cases such sets were wrong more often than right.
     let doubtful = imperfect || best.base.far() || claims.len() > 2;
+    let plays: Vec<&Effect> = best.effects.iter().filter(|o| o.mechanism.family.members_imitate()).collect();
     for (i, (e, s)) in best.effects.iter().zip(&mut support).enumerate() {
         // Two members of one family in one set: something of that kind, but neither of them as it stands.
         let twice = claims.iter().enumerate().any(|(j, c)| i != j && c.family == claims[i].family);
@@ -48,14 +49,11 @@ pub fn firmness(
         let of_turned_noise = own.adds_what_noise_does() && beside("rectified_output");
         // What rounding leaves is neither white nor normal: a change by 0.12 % was firm beside it (report of seed 2383, 0010).
         let of_rounding = beside("quantisation");
-        let of_plays = !own.members_imitate()
-            && best.effects.iter().any(|o| o.mechanism.family.members_imitate())
-            && brings_little(pool, winner, i);
+        let of_plays = !own.members_imitate() && !plays.is_empty() && brings_little(pool, winner, i);
         // A loop with unequal sides is a sum of plays and a curve: a curve at the same signal may be what another law of such loops has in one.
-        let of_a_loop = own == Family::InputNonlinearity
-            && best.effects.iter().any(|o| o.mechanism.family.members_imitate() && o.slot.label == e.slot.label);
+        let of_a_loop = own == Family::InputNonlinearity && plays.iter().any(|o| o.slot.label == e.slot.label);
         // Plays of an input that is counted from elsewhere are those of the input and a constant: about what a loop is centred belongs to its law.
-        let of_its_middle = own == Family::Bias && best.effects.iter().any(|o| o.mechanism.family.members_imitate());
+        let of_its_middle = own == Family::Bias && !plays.is_empty();
         let vague = own.stands_for_others()
             || of_plays
             || of_a_loop

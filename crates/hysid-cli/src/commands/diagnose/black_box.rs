@@ -95,8 +95,7 @@ pub fn score(file: &mut DiagnosisFile, models: Models, picture: &Picture, simula
         }
     }
     if file.verdict == VerdictKind::NoSignificantMismatch {
-        let told: Vec<String> = file.fit.iter().filter_map(contradicted).collect();
-        file.notes.extend(told);
+        file.notes.extend(file.fit.iter().filter_map(contradicted));
     }
 }
 

@@ -1,0 +1,82 @@
+//! The slots between a moving part and a motion that an input prescribes: the ground under a structure, the road under a tyre.
+
+use hysid_plant::Expr;
+
+use super::Slot;
+use super::algebra::{constant_coefficient, quotient, unless_one};
+use super::connections::{Stretch, forces_of, is_negative};
+use super::find::Finder;
+use super::motion::{Kinematic, Motion};
+
+impl Finder<'_> {
+    /// Connections with a motion that an input prescribes: a force that holds a velocity and the rate of the input together, or a spring between the two. A
+    /// controller's gain is known, a spring's rate is not.
+    pub(super) fn grounds(&self) -> Vec<Slot> {
+        let mut slots = Vec::new();
+        for one in &self.motions {
+            let Some(x) = one.x.filter(|x| one.derivative.uses(x)) else { continue };
+            for input in &self.simulation.inputs {
+                let rate = Expr::symbol(&input.symbol).derivative_of_input();
+                let holds_rate = |term: &Expr| {
+                    let mut found = false;
+                    term.visit(&mut |e| found |= *e == rate);
+                    found && term.uses(one.v)
+                };
+                let scale = self.travel(one, x, &input.symbol);
+                if scale.is_none() && !forces_of(self.simulation, one).any(|(_, term)| holds_rate(term)) {
+                    continue;
+                }
+                let scale = scale.and_then(unless_one);
+                let of_input = |e: Expr| match &scale {
+                    Some(scale) => scale.clone() * e,
+                    None => e,
+                };
+                let stretch = Stretch {
+                    x: Expr::symbol(x) - of_input(Expr::symbol(&input.symbol)),
+                    v: one.rate() - of_input(rate),
+                    symbol: &input.symbol,
+                    lever: None,
+                    other: None,
+                    words: format!("between {x} and {}", input.symbol),
+                };
+                slots.push(self.connection(one, stretch));
+            }
+        }
+        slots
+    }
+
+    /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too: `0.001` of a road in mm.
+    fn travel(&self, one: &Motion<'_>, x: &str, input: &str) -> Option<Expr> {
+        if self.kinematic_input(input) != Kinematic::Displacement {
+            return None;
+        }
+        forces_of(self.simulation, one).find_map(|(_, term)| {
+            let [held, given] = [x, input].map(|s| constant_coefficient(self.simulation, term, s));
+            let (held, given) = (held?, given?);
+            let estimated = |s: &String| self.simulation.parameter(s).is_some_and(|p| !p.fixed);
+            let scale = quotient(-given, held.clone());
+            (held.symbols().iter().any(estimated) && scale.symbols().is_empty() && !is_negative(&scale))
+                .then_some(scale)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Place;
+    use super::super::connections::tests::{slots, slots_driven};
+
+    #[test]
+    fn a_motion_that_an_input_prescribes_is_ground_and_a_reference_is_none() {
+        let (rad, rate) = ("rad", "rad/s");
+        let based = [("q2", "w2", rad), ("w2", "(k*(u - q2) + c*(d(u) - w2))/J", rate)];
+        assert_eq!(slots(Place::Connection, &based), [["q2 - u", "w2 - d(u)", "k", "-w2"].map(str::to_owned)]);
+        // A controller's reference is no ground.
+        assert!(slots(Place::Connection, &[based[0], ("w2", "(k*(u - q2) - c*w2)/J", rate)]).is_empty());
+        let road = "road_mm";
+        let driven = |spring: &str| slots_driven(road, Place::Connection, &[("q2", "w2", "m"), ("w2", spring, "m/s")]);
+        assert!(driven("(n*(0.001*u - q2) - k*q2 - c*w2)/J").is_empty());
+        let tyre = driven("(k*(0.001*u - q2) - c*w2)/J");
+        assert_eq!(tyre, [["q2 - 0.001*u", "w2 - 0.001*d(u)", "k", "-w2"].map(str::to_owned)]);
+    }
+}
