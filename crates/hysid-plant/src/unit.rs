@@ -15,7 +15,7 @@ use hysid_signal::tell::brief;
 ///
 /// Text form: factors separated by spaces, `*`, `.`, `·` or `-`; behind a `/` every factor divides (`W/m^2/K`, `J/kg K`), but for what stands in
 /// parentheses (`V/(rad/s)`); `^`, `**` or raised digits before an exponent (`cm^2.5/s`, `m^(1/3)`, `kg·m²`), also behind parentheses
-/// (`N*(s/m)^0.6`); `m3` is `m^3`; `sqrt(m)`; `-` or `1` or nothing is dimensionless.
+/// (`N*(s/m)^0.6`); `m3` is `m^3`; `sqrt(m)`; a number is a scale (`1e-8 W/K^4`); `-` or `1` or nothing is dimensionless.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Unit {
     /// Names with their exponents in units of [`ONE`].
@@ -146,7 +146,8 @@ impl Unit {
                         *known.entry(base).or_insert(0) += power.saturating_mul(*exponent);
                     }
                 }
-                None if matches!(name.as_str(), "%" | "°") => {}
+                // A scale, as a prefix is.
+                None if matches!(name.as_str(), "%" | "°") || name.starts_with(|c: char| c.is_ascii_digit()) => {}
                 None => *unknown.entry(name.as_str()).or_insert(0) += exponent,
             }
         }

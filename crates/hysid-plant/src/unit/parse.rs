@@ -83,16 +83,15 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A name, a `1` or a product in parentheses, with its exponent; `sqrt` takes the root of the parentheses behind it.
+    /// A name, a number or a product in parentheses, with its exponent; `sqrt` takes the root of the parentheses behind it.
     fn factor(&mut self) -> Read<Unit> {
         if self.left.starts_with('(') {
             let inner = self.parenthesis()?;
             let exponent = self.exponent()?.unwrap_or(ONE);
             return scaled(&inner, exponent);
         }
-        if self.left.starts_with("1") {
-            self.left = &self.left[1..];
-            return Ok(Unit::none());
+        if self.left.starts_with(|c: char| c.is_ascii_digit()) {
+            return self.number();
         }
         let name = self.take_while(|c| c.is_alphabetic() || matches!(c, '%' | '_' | '°'));
         if name.is_empty() {
@@ -103,14 +102,45 @@ impl<'a> Reader<'a> {
             return scaled(&inner, ONE / 2);
         }
         // `m2` is a square metre; of a name that is not known the digit may be a part.
-        let digits = self.take_while(|c| c.is_ascii_digit());
-        let (name, power) = match digits.parse::<i32>() {
-            Ok(power) if exponents(name).is_some() && (1..=12).contains(&power) => (name.to_owned(), power),
-            Ok(_) => (format!("{name}{digits}"), 1),
-            Err(_) => (name.to_owned(), 1),
-        };
+        let known = exponents(name).is_some();
+        let digits = if known { self.decimal() } else { self.take_while(|c| c.is_ascii_digit()) };
+        if !known || digits.is_empty() {
+            let exponent = self.exponent()?.unwrap_or(ONE);
+            return Ok(Unit { factors: vec![(format!("{name}{digits}"), exponent)] });
+        }
+        let power = Unit { factors: vec![(name.to_owned(), sixtieths(digits)?)] };
         let exponent = self.exponent()?.unwrap_or(ONE);
-        Ok(Unit { factors: vec![(name, power * exponent)] })
+        scaled(&power, exponent)
+    }
+
+    /// A number, which tells a scale (`1e-8 W/K^4`); a `1` tells nothing.
+    fn number(&mut self) -> Read<Unit> {
+        let whole = self.left;
+        self.decimal();
+        let power = self.left.strip_prefix(['e', 'E']).map(|rest| rest.strip_prefix(['-', '+']).unwrap_or(rest));
+        if let Some(rest) = power.filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
+            self.left = rest;
+            self.take_while(|c| c.is_ascii_digit());
+        }
+        let text = &whole[..whole.len() - self.left.len()];
+        let exponent = self.exponent()?.unwrap_or(ONE);
+        match text.parse::<f64>() {
+            Ok(1.0) => Ok(Unit::none()),
+            Ok(value) if value > 0.0 && value.is_finite() => Ok(Unit { factors: vec![(text.to_owned(), exponent)] }),
+            _ => Err("a number in it is not positive"),
+        }
+    }
+
+    /// Digits, with a point between two of them: another one separates factors.
+    fn decimal(&mut self) -> &'a str {
+        let whole = self.left;
+        self.take_while(|c| c.is_ascii_digit());
+        let behind = self.left.strip_prefix('.').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+        if let Some(rest) = behind.filter(|_| self.left.len() < whole.len()) {
+            self.left = rest;
+            self.take_while(|c| c.is_ascii_digit());
+        }
+        &whole[..whole.len() - self.left.len()]
     }
 
     fn parenthesis(&mut self) -> Read<Unit> {
@@ -137,19 +167,7 @@ impl<'a> Reader<'a> {
         } else {
             return Ok(None);
         };
-        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| "an exponent is not a number");
-        let exponent = match text.split_once('/') {
-            Some((above, below)) => number(above)? / number(below)?,
-            None => number(&text)?,
-        };
-        if !(exponent != 0.0 && exponent.abs() <= 12.0) {
-            return Err("an exponent is 0 or larger than 12");
-        }
-        let parts = f64::from(ONE) * exponent;
-        if (parts - parts.round()).abs() > 1e-6 {
-            return Err("only exponents such as 2, 0.5, 0.6 or 1/3 are read");
-        }
-        Ok(Some(parts.round() as i32))
+        sixtieths(&text).map(Some)
     }
 
     fn exponent_text(&mut self) -> String {
@@ -159,16 +177,25 @@ impl<'a> Reader<'a> {
             return text;
         }
         let sign = self.take_if(|c| matches!(c, '-' | '+'));
-        let whole = self.take_while(|c| c.is_ascii_digit());
-        // A point between two digits belongs to the exponent; another one separates factors.
-        let behind = self.left.strip_prefix('.').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
-        let mut text = sign.map(String::from).unwrap_or_default() + whole;
-        if let Some(rest) = behind {
-            self.left = rest;
-            text = text + "." + self.take_while(|c| c.is_ascii_digit());
-        }
-        text
+        sign.map(String::from).unwrap_or_default() + self.decimal()
     }
+}
+
+/// An exponent, a number or a quotient of two, in units of [`ONE`].
+fn sixtieths(text: &str) -> Read<i32> {
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| "an exponent is not a number");
+    let exponent = match text.split_once('/') {
+        Some((above, below)) => number(above)? / number(below)?,
+        None => number(text)?,
+    };
+    if !(exponent != 0.0 && exponent.abs() <= 12.0) {
+        return Err("an exponent is 0 or larger than 12");
+    }
+    let parts = f64::from(ONE) * exponent;
+    if (parts - parts.round()).abs() > 1e-6 {
+        return Err("only exponents such as 2, 0.5, 0.6 or 1/3 are read");
+    }
+    Ok(parts.round() as i32)
 }
 
 /// A unit to a power in units of [`ONE`].
@@ -219,13 +246,29 @@ mod tests {
         check("1", "-");
         check("V/V", "-");
         check("kgm2", "kgm2");
+        check("cm2.5/s", "cm^2.5/s");
+        check("N.m2.s", "N m^2 s");
+        check("1e-8 W/K4", "1e-8 W/K^4");
+        check("10^-8 W/(m2 K4)", "W/(10^8 m^2 K^4)");
+        check("1.0 m", "m");
+        check("ft3", "ft3");
         check("µm/V", "µm/V");
     }
 
     #[test]
     fn what_is_printed_is_read_again() {
-        for text in ["N s/m", "N*(s/m)^0.6", "m^(1/3)", "W/m^2/K", "sqrt(m)/s", "1/s^2", "kg m^2", "-", "(m s)^(1/3)/A"]
-        {
+        for text in [
+            "N s/m",
+            "N*(s/m)^0.6",
+            "m^(1/3)",
+            "W/m^2/K",
+            "sqrt(m)/s",
+            "1/s^2",
+            "kg m^2",
+            "-",
+            "(m s)^(1/3)/A",
+            "1e-8 W/K4",
+        ] {
             let unit = Unit::parse(text).unwrap();
             assert_eq!(Unit::parse(&unit.to_string()).as_ref(), Ok(&unit), "{text} as {unit}");
         }
@@ -242,7 +285,9 @@ mod tests {
         check("/s", "factor is missing");
         check("N (s", "`(` has no `)`");
         check("N s)", "`)` has no `(`");
-        check("3 N", "not a name");
+        check("#N", "not a name");
+        check("0 N", "not positive");
+        check("1e999 N", "not positive");
         check("N^x", "not a number");
         check("N^", "not a number");
         check("m^0", "0 or larger");
