@@ -186,6 +186,11 @@ pub fn explore<'a, 'd>(
         (significant, p_value) = (false, p);
         pool.clear();
     }
+    if significant && let Some(note) = search.by_rounding(&none, &pool) {
+        notes.push(note);
+        (significant, p_value) = (false, 1.0);
+        pool.clear();
+    }
     for question in request.questions {
         (hooks.progress)("weighing what was asked");
         match search.answer(&none, question) {

@@ -21,6 +21,7 @@ pub mod profile;
 pub mod rehearsal;
 pub mod ripple;
 pub mod rivals;
+pub mod rounding;
 pub mod screen;
 pub mod second_look;
 pub mod simpler;

@@ -13,7 +13,7 @@ use crate::evidence::{Projector, norm2};
 use crate::mechanism::{Places, Shape};
 use crate::model::Model;
 use crate::model::base::{Base, QUANTILE};
-use crate::model::hypothesis::{Hypothesis, Setting};
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
 /// Values on either side of where the shape stands, over one spacing.
 const ASIDE: usize = 12;
@@ -60,7 +60,7 @@ pub fn profile_shapes<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, index: 
 
 /// Puts the moments of a set's effects into the middle of the time in which they could as well be. To be done last: a fit goes on from anywhere in it.
 pub fn centre_moments<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>) {
-    let shapes = h.effects.iter().flat_map(|e| &e.written.shapes).filter(|s| s.places == Places::Moments);
+    let shapes = h.effects.iter().flat_map(Effect::moments);
     for shape in shapes.cloned().collect::<Vec<_>>() {
         if let Some(centred) = centred(setting, &h.base, &shape) {
             h.base = centred;
@@ -324,7 +324,7 @@ mod tests {
         let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &at_c);
         let mut h = refit(&setting, &none, &found[0]).unwrap();
         centre_moments(&setting, &mut h);
-        let shape = h.effects[0].written.shapes.iter().find(|s| s.places == Places::Moments).unwrap();
+        let shape = h.effects[0].moments().next().unwrap();
         let profile = Profile::of(&h.base, shape).unwrap();
         let moments: Vec<f64> = (0..3800).map(|n| 0.5 * f64::from(n) * PERIOD).collect();
         let errors = profile.at(&moments);

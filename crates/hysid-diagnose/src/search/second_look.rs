@@ -12,7 +12,7 @@ use super::rehearsal::by_rehearsal;
 use super::rivals::short_list;
 use super::screen::Candidate;
 use crate::evidence::{NoiseModel, better_by_chance, difference};
-use crate::mechanism::{Places, SLOW};
+use crate::mechanism::SLOW;
 use crate::model::base::spared;
 use crate::model::hypothesis::{Effect, Hypothesis, block_score};
 use crate::openset::ODDS_AGAINST;
@@ -148,8 +148,7 @@ impl<'d> Search<'_, 'd> {
 
     /// Places at which an effect was looked for by the residual itself: a line of its spectrum, a moment of the recording.
     pub fn places_of(&self, effect: &Effect) -> f64 {
-        let moments = effect.written.shapes.iter().filter(|shape| shape.places == Places::Moments).count();
-        lines_of(self.setting.data, &effect.written) * MOMENTS.powi(moments as i32)
+        lines_of(self.setting.data, &effect.written) * MOMENTS.powi(effect.moments().count() as i32)
     }
 
     /// The same where the residual is mismatch throughout and no noise model can be had: a set that takes [`LARGE`] of its power or brings

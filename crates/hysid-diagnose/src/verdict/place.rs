@@ -5,7 +5,6 @@
 
 use hysid_plant::Expr;
 
-use crate::mechanism::Places;
 use crate::model::along;
 use crate::model::hypothesis::{Effect, Hypothesis};
 use crate::slot::is_turn;
@@ -27,7 +26,7 @@ struct Level {
 /// What may change with the place in the place of such an effect, in words; `None` where an effect has no moment, or the recording has been everywhere before it and after it.
 pub fn place_of_change(h: &Hypothesis<'_>, effect: &Effect) -> Option<String> {
     let values = h.base.values();
-    let moment = effect.written.shapes.iter().find(|shape| shape.places == Places::Moments)?;
+    let moment = effect.moments().next()?;
     let moment = *values.parameters.get(&moment.name)?;
     let (data, simulation) = (h.base.model.data(), h.base.model.simulation());
     let inputs = simulation.inputs.iter().map(|u| u.symbol.as_str());
