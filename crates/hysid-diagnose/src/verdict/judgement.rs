@@ -103,7 +103,7 @@ impl<'d> Judgement<'d> {
         let mut within = if cut_short { VerdictKind::Ambiguous } else { verdict(&support) };
         let remaining = rest.record(pool, winner);
         let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
-            || wandering.iter().flatten().any(|w| w.probability >= FIRM);
+            || wandering.iter().flatten().any(|w| w.is_sure(search.options.alpha));
         let outside = elsewhere || rest.is_outside(&support, remaining.as_ref());
         let runs_away = pool[0].base.model.runs_away(&pool[0].base.fit.theta);
         let veto = match winner {

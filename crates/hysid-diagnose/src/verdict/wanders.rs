@@ -6,12 +6,13 @@
 
 use std::collections::BTreeMap;
 
+use super::FIRM;
 use super::place::place_of_change;
 use super::weigh::EVIDENCE_WEIGHT;
 use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
-use crate::openset::noises;
 use crate::openset::varying::{Varying, varying};
+use crate::openset::{ODDS_AGAINST_MORE, noises};
 use crate::search::Search;
 use crate::text::number;
 
@@ -20,6 +21,8 @@ use crate::text::number;
 pub struct Wanders {
     /// The probability of it, beside the effect.
     pub probability: f64,
+    /// A bound for the probability that something which varies gains so much by chance where nothing does.
+    pub by_chance: f64,
     /// What it does, in words.
     pub words: String,
 }
@@ -31,10 +34,21 @@ const AS_WELL: f64 = 0.6;
 const WORTH_SAYING: f64 = 0.02;
 
 impl Wanders {
+    /// What explains a change as well, of which nothing but that is known.
+    fn as_well(words: String) -> Self {
+        Self { probability: AS_WELL, by_chance: 1.0, words }
+    }
+
+    /// Whether there is no doubt of it: it is firm beside the effect, and would be seen if the effect had never been thought of. An effect that was added
+    /// for next to nothing is outdone by anything that varies as little.
+    pub fn is_sure(&self, alpha: f64) -> bool {
+        self.probability >= FIRM && self.by_chance < alpha
+    }
+
     /// In words, beside the effect; `None` where it is too unlikely to be said.
     pub fn in_place_of(&self, e: &Effect) -> Option<String> {
         (self.probability >= WORTH_SAYING).then(|| {
-            let Self { probability, words } = self;
+            let Self { probability, words, .. } = self;
             let (id, slot) = (e.mechanism.id, &e.slot.label);
             format!("with a probability of {} it is not {id} at {slot} but {words}", number(*probability))
         })
@@ -53,12 +67,12 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
             return None;
         }
         if let Some(words) = place_of_change(best, &best.effects[member]) {
-            return Some(Wanders { probability: AS_WELL, words });
+            return Some(Wanders::as_well(words));
         }
         let course = |i: usize| is_one_course(best, i, member);
         // One parameter that changes in two ways at once does what it likes.
         let several = (0..best.effects.len()).filter(|&i| course(i)).count() > 1;
-        let as_well = several.then(|| Wanders { probability: AS_WELL, words: own_course(&best.effects[member]) });
+        let as_well = several.then(|| Wanders::as_well(own_course(&best.effects[member])));
         let Some(rest) = best_that_says(pool, &best.key_of(|i| !course(i))) else { return as_well };
         let base = &pool[rest].base;
         let found = heard.entry(rest).or_insert_with(|| varying(base, kind, &noises(base, kind)));
@@ -67,7 +81,8 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
         let places = search.places_of(&best.effects[member]).ln();
         let lead = best.log_evidence - pool[rest].log_evidence - places - found.gain_as_a_rival();
         let probability = 1.0 / (1.0 + (EVIDENCE_WEIGHT * lead).exp());
-        let found = Wanders { probability, words: found.words() };
+        let by_chance = (ODDS_AGAINST_MORE * (-found.gain).exp()).min(1.0);
+        let found = Wanders { probability, by_chance, words: found.words() };
         Some(as_well.filter(|w| w.probability > found.probability).unwrap_or(found))
     };
     (0..best.effects.len()).map(of).collect()
@@ -118,6 +133,13 @@ mod tests {
         let walk = |t: f64| 1.0 + 0.02 * ((0.31 * t).sin() + (0.17 * t).cos() * (0.53 * t).sin());
         let walk = beside(&["abrupt_change"], walk)[0];
         assert!(walk > 0.1, "{walk}");
+    }
+
+    #[test]
+    fn what_varies_by_next_to_nothing_is_not_outside_the_catalogue() {
+        let of = |by_chance| Wanders { probability: 0.95, by_chance, words: String::new() };
+        assert!(of(1e-4).is_sure(0.01) && !of(0.02).is_sure(0.01));
+        assert!(!Wanders::as_well(String::new()).is_sure(0.01));
     }
 
     #[test]
