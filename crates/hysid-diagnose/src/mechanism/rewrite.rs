@@ -8,7 +8,7 @@ use super::copies::{follow, renewed};
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
 use super::{Amplitudes, Change, Law, Mechanism, Purpose, Role, Start};
-use crate::slot::{ForcePath, Pull, Slot, Target, force_path, play_of};
+use crate::slot::{FeedsBack, ForcePath, Pull, Slot, Target, force_path, play_of};
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -150,7 +150,11 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
         (Target::Output(column), Change::Force(text) | Change::Drive(text)) => {
             let force = writer.text(text)?;
             let output = simulation.output_mut(column).ok_or("the output is gone")?;
-            output.expression = output.expression.clone() + force;
+            output.expression = output.expression.clone() + force.clone();
+            if let Some(FeedsBack { state, times }) = &slot.feeds_back {
+                let derivative = simulation.state(state).ok_or("the state is gone")?.derivative.clone();
+                derive(simulation, slot, state, &derivative, derivative.clone() + times.clone() * force);
+            }
             Ok(())
         }
         (Target::Derivatives(states), Change::Force(text) | Change::Drive(text) | Change::Outflow(text)) => {

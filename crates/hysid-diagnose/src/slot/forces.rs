@@ -6,7 +6,7 @@ use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_pa
 use super::balance::is_scaled;
 use super::find::{Finder, has_unit, is_one_of};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
-use super::{Place, Pull, Slot, Target};
+use super::{FeedsBack, Place, Pull, Slot, Target};
 
 impl Finder<'_> {
     /// Offers what every force slot has: the size of the forces, the mass, the linear stiffness and damping. `scale` is what the rate of the
@@ -142,8 +142,8 @@ impl Finder<'_> {
         slots
     }
 
-    /// The laws by which windings draw current: over the flux linkage as a force over a displacement, whose velocity is the voltage. The current of the
-    /// law is not fed back to the voltage across the winding's resistance, which a measured core makes small.
+    /// The laws by which windings draw current: over the flux linkage as a force over a displacement, whose velocity is the voltage. Where that drops
+    /// over a resistance by the current, it drops by the law's current too.
     pub(super) fn core_laws(&self) -> Vec<Slot> {
         let flux =
             |s: &&State| has_unit(self.simulation.unit_of(&s.name), &["Wb"]) && self.original.state(&s.name).is_some();
@@ -152,8 +152,18 @@ impl Finder<'_> {
         let currents = currents.filter(|o| has_unit(self.unit_of_output(&o.column, &o.expression), &["A"]));
         currents
             .flat_map(|o| fluxes.iter().filter(|s| o.expression.uses(&s.name)).map(move |s| (o, *s)))
-            .map(|(o, s)| self.force_law(o, Some(&s.name), s.derivative.clone()))
+            .map(|(o, s)| Slot {
+                feeds_back: self.feeds_back(o, s),
+                ..self.force_law(o, Some(&s.name), s.derivative.clone())
+            })
             .collect()
+    }
+
+    /// How a state feels an output, where both hold it in proportion.
+    fn feeds_back(&self, output: &Output, state: &State) -> Option<FeedsBack> {
+        let coefficient = |e: &Expr| linear_coefficient(self.simulation, e, &state.name);
+        let times = quotient(coefficient(&state.derivative)?, coefficient(&output.expression)?);
+        Some(FeedsBack { state: state.name.clone(), times })
     }
 
     /// The slot of a law that gives an output over a displacement and its velocity.
@@ -192,6 +202,8 @@ mod tests {
     use super::super::Structure;
     use super::super::connections::tests::slots;
     use super::*;
+    use crate::mechanism::Purpose;
+    use crate::mechanism::conformance::example_signals;
 
     #[test]
     fn a_displacement_may_be_a_multiple_of_what_its_velocity_sums_up_to() {
@@ -215,16 +227,47 @@ mod tests {
         assert_eq!(found[0][..2], ["y", "w1"]);
     }
 
+    /// The slots of a core's current, measured in this column as this, and its simulation.
+    fn core(unit: &str, column: &str, current: &str) -> (Simulation, Vec<Slot>) {
+        let text = format!(
+            "[time]\nperiod_s = 1e-4\n[inputs]\ne = \"primary_V\"\n[parameters]\nR = {{ value = 2.0, min = 0.1, unit = \"ohm\" }}\nL = {{ value = 0.5, min = 0.1, unit = \"H\" }}\n\
+             [states]\nlam = {{ derivative = \"e - R*lam/L\", initial = 0.0, unit = \"{unit}\" }}\n[outputs]\n{column} = \"{current}\"\n"
+        );
+        let simulation = Simulation::parse(&text, "core.sim.toml").unwrap();
+        let slots = Structure::of(&simulation).slots.into_iter().filter(|s| s.place == Place::ForceLaw).collect();
+        (simulation, slots)
+    }
+
+    #[test]
+    fn what_a_core_draws_drops_over_the_resistance() {
+        let times = |column: &str, current: &str| {
+            let (_, slots) = core("Wb", column, current);
+            slots[0].feeds_back.as_ref().map(|back| back.times.to_string())
+        };
+        assert_eq!(times("primary_A", "lam/L").as_deref(), Some("-R"));
+        assert_eq!(times("primary_mA", "1000*lam/L").as_deref(), Some("-(R/1000)"));
+        let (simulation, slots) = core("Wb", "primary_A", "lam/L");
+        let law = crate::mechanism::mechanism("dahl_friction").unwrap();
+        let signals = example_signals(&simulation, &slots[0]);
+        let written = law.rewrite(&simulation, &slots[0], &signals, Purpose::Refit).unwrap();
+        // The loop follows the voltage that is left, which is the flux's own rate.
+        let own = &written.simulation.state("lam").unwrap().derivative;
+        let added = written.simulation.state(&written.states[0]).unwrap();
+        assert!(own.uses(&added.name) && own.uses("R"), "{own}");
+        let held = |e: &Expr| {
+            let mut found = false;
+            e.visit(&mut |part| found |= part == own);
+            found
+        };
+        assert!(held(&added.derivative), "{} beside {own}", added.derivative);
+        // The law stands at the measured current and at no other place of the circuit.
+        assert!(!Structure::of(&simulation).slots.iter().any(|s| s.place == Place::Circuit));
+    }
+
     #[test]
     fn a_core_draws_its_current_over_the_flux_as_a_spring_its_force_over_the_displacement() {
         let of = |unit: &str, column: &str| {
-            let text = format!(
-                "[time]\nperiod_s = 1e-4\n[inputs]\ne = \"primary_V\"\n[parameters]\nR = {{ value = 2.0, min = 0.1, unit = \"ohm\" }}\nL = {{ value = 0.5, min = 0.1, unit = \"H\" }}\n\
-                 [states]\nlam = {{ derivative = \"e - R*lam/L\", initial = 0.0, unit = \"{unit}\" }}\n[outputs]\n{column} = \"lam/L\"\n"
-            );
-            let simulation = Simulation::parse(&text, "core.sim.toml").unwrap();
-            let slots = Structure::of(&simulation).slots.into_iter();
-            let laws = slots.filter(|s| s.place == Place::ForceLaw);
+            let laws = core(unit, column, "lam/L").1.into_iter();
             laws.map(|s| ["x", "v", "k"].map(|q| s.quantity(q).unwrap().expression.to_string())).collect::<Vec<_>>()
         };
         assert_eq!(of("Wb", "primary_A"), [["lam", "e - R*lam/L", "1/L"].map(str::to_owned)]);

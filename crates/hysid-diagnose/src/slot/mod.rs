@@ -23,6 +23,7 @@ mod motion;
 mod pattern;
 mod sensed;
 mod stores;
+mod target;
 mod turn;
 
 use std::collections::BTreeMap;
@@ -36,6 +37,7 @@ pub(crate) use balance::with_balances;
 pub(crate) use loops::play_of;
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
+pub(crate) use target::{FeedsBack, Pull, Target};
 pub(crate) use turn::{is_turn, with_turns, with_used_turns};
 
 /// Signs of a velocity that a simulation may have: the sharp one, then the smoothed ones that may stand in its place.
@@ -92,50 +94,6 @@ pub enum Place {
     Disturbance,
 }
 
-/// Where a law's text ends up.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Target {
-    /// Taken from the derivatives of these states, above the line of a quotient by a mass.
-    Derivatives(Vec<Pull>),
-    /// Added to this output.
-    Output(String),
-    /// Replaces this symbol in every equation.
-    Symbol(String),
-    /// Replaces this symbol in the derivatives of these states. Where the signal is a sum, the expression is what it holds besides the
-    /// symbol.
-    SymbolIn(String, Vec<String>, Option<Expr>),
-    /// Replaces this part of the derivatives of these states.
-    PartIn(Expr, Vec<String>),
-    /// Replaces the half-width of every play of this symbol; `r` stands for what it was.
-    HalfWidths(String),
-}
-
-/// A state whose derivative a force changes, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Pull {
-    /// The state.
-    pub state: String,
-    /// Whether the force is taken from it (1) or added to it (-1).
-    pub sign: f64,
-    /// What the force is multiplied by where that is not one: the ratio of a gear.
-    pub lever: Option<Expr>,
-}
-
-impl Pull {
-    /// A force that is taken from this state, times the sign.
-    fn new(state: &str, sign: f64) -> Self {
-        Self { state: state.to_owned(), sign, lever: None }
-    }
-
-    /// The part of a force that this state feels.
-    pub fn of(&self, force: &Expr) -> Expr {
-        match &self.lever {
-            Some(lever) => lever.clone() * force.clone(),
-            None => force.clone(),
-        }
-    }
-}
-
 /// A place of a simulation at which a mechanism can stand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slot {
@@ -150,6 +108,8 @@ pub struct Slot {
     pub(crate) target: Target,
     /// Outputs that measure the derivatives which a force here changes.
     pub(crate) sensed: Vec<Sensed>,
+    /// What feels the output that a law here adds to.
+    pub(crate) feeds_back: Option<FeedsBack>,
     /// What is looked through for a mechanism that is already there.
     context: Vec<Expr>,
     inputs: usize,
@@ -195,6 +155,7 @@ impl Slot {
             symbols: BTreeMap::new(),
             target,
             sensed: Vec::new(),
+            feeds_back: None,
             context: Vec::new(),
             inputs: 0,
             idle_loads: Vec::new(),
@@ -300,6 +261,11 @@ impl Slot {
             });
         }
         found
+    }
+
+    /// Whether a law that is added to an output here acts on this state too.
+    fn acts_on(&self, state: &str) -> bool {
+        self.feeds_back.as_ref().is_some_and(|back| back.state == state)
     }
 
     /// The measure of a mass here: `m` where there is one, else a pure number.

@@ -1,0 +1,56 @@
+//! Where a law's text ends up in the equations.
+
+use hysid_plant::Expr;
+
+/// Where a law's text ends up.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Target {
+    /// Taken from the derivatives of these states, above the line of a quotient by a mass.
+    Derivatives(Vec<Pull>),
+    /// Added to this output.
+    Output(String),
+    /// Replaces this symbol in every equation.
+    Symbol(String),
+    /// Replaces this symbol in the derivatives of these states. Where the signal is a sum, the expression is what it holds besides the
+    /// symbol.
+    SymbolIn(String, Vec<String>, Option<Expr>),
+    /// Replaces this part of the derivatives of these states.
+    PartIn(Expr, Vec<String>),
+    /// Replaces the half-width of every play of this symbol; `r` stands for what it was.
+    HalfWidths(String),
+}
+
+/// A state whose derivative a force changes, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pull {
+    /// The state.
+    pub state: String,
+    /// Whether the force is taken from it (1) or added to it (-1).
+    pub sign: f64,
+    /// What the force is multiplied by where that is not one: the ratio of a gear.
+    pub lever: Option<Expr>,
+}
+
+impl Pull {
+    /// A force that is taken from this state, times the sign.
+    pub(super) fn new(state: &str, sign: f64) -> Self {
+        Self { state: state.to_owned(), sign, lever: None }
+    }
+
+    /// The part of a force that this state feels.
+    pub fn of(&self, force: &Expr) -> Expr {
+        match &self.lever {
+            Some(lever) => lever.clone() * force.clone(),
+            None => force.clone(),
+        }
+    }
+}
+
+/// A state that feels an output: the flux of a winding, over whose resistance its current drops.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FeedsBack {
+    /// The state.
+    pub state: String,
+    /// What each unit of the output adds to its derivative.
+    pub times: Expr,
+}
