@@ -4,6 +4,7 @@ use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights, stre
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::mechanism::{Family, catalogue};
 use crate::model::hypothesis::{Effect, Hypothesis, OnBlocks, best_that_says};
+use crate::slot::Structure;
 
 /// Log likelihood by which a set must trail before the recording refutes it.
 const REFUTED: f64 = 4.0;
@@ -114,8 +115,8 @@ pub fn is_a_spectrum(h: &Hypothesis<'_>) -> bool {
     })
 }
 
-/// Whether a set with a member of the twin family in this member's place follows the recording as well. That it needs a parameter more makes
-/// it less likely, but refutes nothing: what is named firmly must be what the recording demands.
+/// Whether a set with a member of the twin family in this member's place follows the recording as well, or was never fitted although the simulation has a
+/// place for one. That it needs a parameter more makes it less likely, but refutes nothing: what is named firmly must be what the recording demands.
 fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     let best = &pool[winner];
     let Some(twin) = best.effects[member].mechanism.family.twin() else { return false };
@@ -127,12 +128,21 @@ fn has_twin(pool: &[Hypothesis<'_>], winner: usize, member: usize) -> bool {
     } else {
         REFUTED
     };
-    pool.iter().any(|h| {
+    let in_its_place = |h: &&Hypothesis<'_>| {
         let of_twin = h.effects.iter().position(|e| e.mechanism.family == twin);
-        h.effects.len() == best.effects.len()
-            && of_twin.is_some_and(|place| h.key_without(place) == rest)
-            && h.base.log_likelihood > best.base.log_likelihood - refuted
-    })
+        h.effects.len() == best.effects.len() && of_twin.is_some_and(|place| h.key_without(place) == rest)
+    };
+    let nearest = pool.iter().filter(in_its_place).map(|h| h.base.log_likelihood).max_by(f64::total_cmp);
+    match nearest {
+        Some(nearest) => nearest > best.base.log_likelihood - refuted,
+        None => can_stand(&pool[0], twin),
+    }
+}
+
+/// Whether a member of a family has a slot in the simulation as it is.
+fn can_stand(none: &Hypothesis<'_>, family: Family) -> bool {
+    let structure = Structure::of(&none.base.document());
+    catalogue().iter().any(|m| m.family == family && !m.slots(&structure).is_empty())
 }
 
 /// Whether a member is a loop on a part that no spring of the simulation holds, as a drive: a hysteretic spring and a friction that gives way elastically
@@ -151,4 +161,47 @@ fn passes_between_samples(h: &Hypothesis<'_>, member: usize) -> bool {
     effect.mechanism.family == Family::SignalPathLag
         && (effect.written.shapes.iter().filter_map(|shape| values.parameters.get(&shape.name)))
             .all(|tau| *tau < h.base.model.data().period_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
+    use crate::request::{Hooks, Options};
+    use crate::search::Search;
+
+    /// Whether a lag at the input stands for a winding, where these sets besides were fitted to a recording of an oscillator that lags.
+    fn stands_for_a_winding(text: &str, output: &str, besides: &[&str]) -> bool {
+        let mut random = normal(5);
+        let mut u = drive(600, &mut random);
+        let y = respond(&u, REAL, |_, _| 0.0);
+        // The input is recorded four samples early.
+        u.rotate_left(4);
+        let original = Simulation::parse(text, "test.sim.toml").unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), (output, y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
+        let search = Search::new(setting, Options::default(), &hooks);
+        let sets = std::iter::once("delay").chain(besides.iter().copied());
+        let sets: Vec<Hypothesis<'_>> =
+            sets.filter_map(|id| search.answer(&none, &vec![(id.to_owned(), "input:u".to_owned())])).collect();
+        let pool: Vec<Hypothesis<'_>> = std::iter::once(none).chain(sets).collect();
+        assert_eq!(pool.len(), 2 + besides.len());
+        has_twin(&pool, 1, 0)
+    }
+
+    #[test]
+    fn a_twin_that_was_never_fitted_refutes_nothing() {
+        assert!(stands_for_a_winding(BASELINE, "x_m", &[]));
+        assert!(!stands_for_a_winding(BASELINE, "x_m", &["back_emf"]), "it was fitted and does not follow");
+        let store = "[inputs]\nu = \"u_N\"\n[time]\nperiod_s = 0.025\n[parameters]\na = { value = 1.0, min = 0.1, max = 9.0 }\n[states]\n\
+                     h = { derivative = \"u - a*h\", initial = 0.0, unit = \"K\" }\n[outputs]\nh_K = \"h\"\n";
+        assert!(!stands_for_a_winding(store, "h_K", &[]), "nothing moves that could induce a voltage");
+    }
 }
