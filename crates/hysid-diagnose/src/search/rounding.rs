@@ -11,8 +11,9 @@ use crate::model::hypothesis::Hypothesis;
 
 /// What is rounded to steps that are told as an effect otherwise.
 const ROUNDING: &str = "quantisation";
-/// Part of a step that may be left beside the rounding (rms), which makes 0.29 of it itself.
-const BESIDE: f64 = 0.05;
+/// Part of a step that may be left beside the rounding (rms), which makes 0.29 of it itself: of two hundred samples one is rounded to the next step, since the
+/// parameters are not known better.
+const BESIDE: f64 = 0.07;
 /// Steps that the recording covers where they are fine.
 const FINE: f64 = 64.0;
 /// Share of what is left of another output that effects must not have taken from it.
