@@ -8,7 +8,7 @@ use super::copies::{follow, renewed};
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
 use super::{Amplitudes, Change, Law, Mechanism, Purpose, Role, Start};
-use crate::slot::{FeedsBack, ForcePath, Pull, Slot, Target, force_path, play_of};
+use crate::slot::{ForcePath, Pull, Slot, Target, force_path, play_of};
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -151,9 +151,10 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             let force = writer.text(text)?;
             let output = simulation.output_mut(column).ok_or("the output is gone")?;
             output.expression = output.expression.clone() + force.clone();
-            if let Some(FeedsBack { state, times }) = &slot.feeds_back {
-                let derivative = simulation.state(state).ok_or("the state is gone")?.derivative.clone();
-                derive(simulation, slot, state, &derivative, derivative.clone() + times.clone() * force);
+            if let Some(pull) = &slot.feeds_back {
+                let derivative = simulation.state(&pull.state).ok_or("the state is gone")?.derivative.clone();
+                let felt = pull.join(derivative.clone(), pull.of(&force), 1.0);
+                derive(simulation, slot, &pull.state, &derivative, felt);
             }
             Ok(())
         }
@@ -163,9 +164,7 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             for pull in states {
                 let (name, force) = (&pull.state, pull.of(&force));
                 let derivative = simulation.state(name).ok_or("the state is gone")?.derivative.clone();
-                let joined = |sum: Expr, part: &Expr| {
-                    if pull.sign * resists > 0.0 { sum - part.clone() } else { sum + part.clone() }
-                };
+                let joined = |sum: Expr, part: &Expr| pull.join(sum, part.clone(), resists);
                 let (written, rate) = match force_path(simulation, &derivative) {
                     ForcePath::Quotient(above, below) => {
                         (joined(above.clone(), &force) / below.clone(), force.clone() / below.clone())

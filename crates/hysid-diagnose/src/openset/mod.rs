@@ -65,6 +65,11 @@ pub const ODDS_AGAINST: f64 = 1000.0;
 /// Odds against something more where a mismatch is known.
 pub const ODDS_AGAINST_MORE: f64 = 10.0;
 
+/// A bound for the probability that log evidence is gained by chance (Markov), at these odds against a mismatch.
+pub fn gains_by_chance(gain: f64, odds_against: f64) -> f64 {
+    (odds_against * (-gain).exp()).min(1.0)
+}
+
 impl OpenSet {
     /// A bound for the probability that a correction gains so much where nothing is missing; 1 where it does not help on held-out blocks.
     pub fn by_chance(&self, odds_against: f64) -> f64 {
@@ -73,7 +78,7 @@ impl OpenSet {
 
     /// The same without a look at blocks: on the tangent a term that acts at a few moments may spoil those in which it does not, and not when it is refitted.
     pub fn gains_by_chance(&self, odds_against: f64) -> f64 {
-        (odds_against * (-self.gain).exp()).min(1.0)
+        gains_by_chance(self.gain, odds_against)
     }
 
     /// Its terms, where it is made of such.

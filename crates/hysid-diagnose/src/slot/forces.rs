@@ -6,7 +6,7 @@ use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_pa
 use super::balance::is_scaled;
 use super::find::{Finder, has_unit, is_one_of};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
-use super::{FeedsBack, Place, Pull, Slot, Target};
+use super::{Place, Pull, Slot, Target};
 
 impl Finder<'_> {
     /// Offers what every force slot has: the size of the forces, the mass, the linear stiffness and damping. `scale` is what the rate of the
@@ -142,28 +142,36 @@ impl Finder<'_> {
         slots
     }
 
-    /// The laws by which windings draw current: over the flux linkage as a force over a displacement, whose velocity is the voltage. Where that drops
-    /// over a resistance by the current, it drops by the law's current too.
-    pub(super) fn core_laws(&self) -> Vec<Slot> {
+    /// The windings whose current is measured: the output, and the flux linkage on which it depends.
+    fn windings(&self) -> Vec<(&Output, &State)> {
         let flux =
             |s: &&State| has_unit(self.simulation.unit_of(&s.name), &["Wb"]) && self.original.state(&s.name).is_some();
         let fluxes: Vec<&State> = self.simulation.states.iter().filter(flux).collect();
         let currents = self.simulation.outputs.iter();
         let currents = currents.filter(|o| has_unit(self.unit_of_output(&o.column, &o.expression), &["A"]));
-        currents
-            .flat_map(|o| fluxes.iter().filter(|s| o.expression.uses(&s.name)).map(move |s| (o, *s)))
-            .map(|(o, s)| Slot {
-                feeds_back: self.feeds_back(o, s),
-                ..self.force_law(o, Some(&s.name), s.derivative.clone())
-            })
-            .collect()
+        currents.flat_map(|o| fluxes.iter().filter(|s| o.expression.uses(&s.name)).map(move |s| (o, *s))).collect()
+    }
+
+    /// The laws by which windings draw current: over the flux linkage as a force over a displacement, whose velocity is the voltage. Where that drops
+    /// over a resistance by the current, it drops by the law's current too.
+    pub(super) fn core_laws(&self) -> Vec<Slot> {
+        let law = |(o, s): (&Output, &State)| Slot {
+            feeds_back: self.feeds_back(o, s),
+            ..self.force_law(o, Some(&s.name), s.derivative.clone())
+        };
+        self.windings().into_iter().map(law).collect()
+    }
+
+    /// Whether a law of a measured current acts on this state too.
+    pub(super) fn feels_its_current(&self, state: &str) -> bool {
+        self.windings().into_iter().any(|(o, s)| s.name == state && self.feeds_back(o, s).is_some())
     }
 
     /// How a state feels an output, where both hold it in proportion.
-    fn feeds_back(&self, output: &Output, state: &State) -> Option<FeedsBack> {
+    fn feeds_back(&self, output: &Output, state: &State) -> Option<Pull> {
         let coefficient = |e: &Expr| linear_coefficient(self.simulation, e, &state.name);
         let times = quotient(coefficient(&state.derivative)?, coefficient(&output.expression)?);
-        Some(FeedsBack { state: state.name.clone(), times })
+        Some(Pull { lever: Some(times), ..Pull::new(&state.name, -1.0) })
     }
 
     /// The slot of a law that gives an output over a displacement and its velocity.
@@ -242,7 +250,7 @@ mod tests {
     fn what_a_core_draws_drops_over_the_resistance() {
         let times = |column: &str, current: &str| {
             let (_, slots) = core("Wb", column, current);
-            slots[0].feeds_back.as_ref().map(|back| back.times.to_string())
+            slots[0].feeds_back.as_ref().and_then(|pull| Some(pull.lever.as_ref()?.to_string()))
         };
         assert_eq!(times("primary_A", "lam/L").as_deref(), Some("-R"));
         assert_eq!(times("primary_mA", "1000*lam/L").as_deref(), Some("-(R/1000)"));

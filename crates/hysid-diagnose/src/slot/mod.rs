@@ -37,7 +37,7 @@ pub(crate) use balance::with_balances;
 pub(crate) use loops::play_of;
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
-pub(crate) use target::{FeedsBack, Pull, Target};
+pub(crate) use target::{Pull, Target};
 pub(crate) use turn::{is_turn, with_turns, with_used_turns};
 
 /// Signs of a velocity that a simulation may have: the sharp one, then the smoothed ones that may stand in its place.
@@ -108,8 +108,8 @@ pub struct Slot {
     pub(crate) target: Target,
     /// Outputs that measure the derivatives which a force here changes.
     pub(crate) sensed: Vec<Sensed>,
-    /// What feels the output that a law here adds to.
-    pub(crate) feeds_back: Option<FeedsBack>,
+    /// The state that feels the output which a law here adds to: the flux of a winding its current.
+    pub(crate) feeds_back: Option<Pull>,
     /// What is looked through for a mechanism that is already there.
     context: Vec<Expr>,
     inputs: usize,
@@ -261,11 +261,6 @@ impl Slot {
             });
         }
         found
-    }
-
-    /// Whether a law that is added to an output here acts on this state too.
-    fn acts_on(&self, state: &str) -> bool {
-        self.feeds_back.as_ref().is_some_and(|back| back.state == state)
     }
 
     /// The measure of a mass here: `m` where there is one, else a pure number.

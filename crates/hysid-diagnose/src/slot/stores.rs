@@ -45,11 +45,9 @@ impl Finder<'_> {
     /// The electrical states of a circuit of first order: iron that saturates draws a current as a spring that stiffens draws a force. Where the current is
     /// measured the law stands there, and acts on both.
     pub(super) fn circuits(&self) -> Vec<Slot> {
-        let measured: Vec<Slot> = self.core_laws();
-        let measured = |name: &str| measured.iter().any(|law| law.acts_on(name));
         let mut slots = self.held(Place::Circuit, |name| {
             let electrical = has_unit(self.simulation.unit_of(name), &["Wb", "A", "C", "V"]);
-            self.motions.is_empty() && electrical && !measured(name)
+            self.motions.is_empty() && electrical && !self.feels_its_current(name)
         });
         for slot in &mut slots {
             if let Some(held) = slot.quantity("s").cloned() {

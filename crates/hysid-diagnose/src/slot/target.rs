@@ -27,7 +27,7 @@ pub(crate) struct Pull {
     pub state: String,
     /// Whether the force is taken from it (1) or added to it (-1).
     pub sign: f64,
-    /// What the force is multiplied by where that is not one: the ratio of a gear.
+    /// What the force is multiplied by where that is not one: the ratio of a gear, the resistance over which a current drops.
     pub lever: Option<Expr>,
 }
 
@@ -44,13 +44,9 @@ impl Pull {
             None => force.clone(),
         }
     }
-}
 
-/// A state that feels an output: the flux of a winding, over whose resistance its current drops.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct FeedsBack {
-    /// The state.
-    pub state: String,
-    /// What each unit of the output adds to its derivative.
-    pub times: Expr,
+    /// A sum in which the state feels this part; `resists` is -1 for what drives.
+    pub fn join(&self, sum: Expr, part: Expr, resists: f64) -> Expr {
+        if self.sign * resists > 0.0 { sum - part } else { sum + part }
+    }
 }

@@ -12,7 +12,7 @@ use super::weigh::EVIDENCE_WEIGHT;
 use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
 use crate::openset::varying::{Varying, varying};
-use crate::openset::{ODDS_AGAINST_MORE, noises};
+use crate::openset::{ODDS_AGAINST_MORE, gains_by_chance, noises};
 use crate::search::Search;
 use crate::text::number;
 
@@ -81,7 +81,7 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
         let places = search.places_of(&best.effects[member]).ln();
         let lead = best.log_evidence - pool[rest].log_evidence - places - found.gain_as_a_rival();
         let probability = 1.0 / (1.0 + (EVIDENCE_WEIGHT * lead).exp());
-        let by_chance = (ODDS_AGAINST_MORE * (-found.gain).exp()).min(1.0);
+        let by_chance = gains_by_chance(found.gain, ODDS_AGAINST_MORE);
         let found = Wanders { probability, by_chance, words: found.words() };
         Some(as_well.filter(|w| w.probability > found.probability).unwrap_or(found))
     };
