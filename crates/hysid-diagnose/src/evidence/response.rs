@@ -66,20 +66,31 @@ impl ForcePath {
         whole.iter().all(|x| x.is_finite()).then_some(path)
     }
 
-    /// The way with a force of unit variance and this pole: matrix, output, covariance of what is added at each row and at the start.
-    fn noise(&self, pole: f64) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>, DMatrix<f64>) {
+    /// Matrix and output of the way with a force of this pole: one with a memory is a state of its own, the last.
+    fn with_force(&self, pole: f64) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.c.len();
         if pole == 0.0 {
-            return (self.a.clone(), self.c.clone(), &self.b * self.b.transpose(), DMatrix::zeros(n, n));
+            return (self.a.clone(), self.c.clone());
         }
         let mut a = self.a.clone().resize(n + 1, n + 1, 0.0);
         a.view_mut((0, n), (n, 1)).copy_from(&self.b);
         a[(n, n)] = pole;
-        let mut added = DMatrix::zeros(n + 1, n + 1);
-        let mut start = added.clone();
-        added[(n, n)] = 1.0 - pole * pole;
-        start[(n, n)] = 1.0;
-        (a, self.c.clone().resize_vertically(n + 1, 0.0), added, start)
+        (a, self.c.clone().resize_vertically(n + 1, 0.0))
+    }
+
+    /// By what the covariance of the state rises in the first row, as directions (in lanes) and the matrix between them.
+    ///
+    /// A white force moves a state that was known. One with a memory has its variance from the start: it moves the others, and the two together, but its own
+    /// variance stays.
+    fn first_rise(&self, pole: f64, variance: f64) -> (Vec<Vec<Lane>>, [[f64; 2]; 2]) {
+        let direction = |parts: DVector<f64>| padded(&DMatrix::from_row_slice(1, parts.len(), parts.as_slice()));
+        if pole == 0.0 {
+            return (vec![direction(self.b.clone())], [[variance, 0.0], [0.0; 2]]);
+        }
+        let n = self.c.len();
+        let moved = self.b.clone().push(pole);
+        let own = DVector::zeros(n).push(pole);
+        (vec![direction(moved), direction(own)], [[variance, 0.0], [0.0, -variance]])
     }
 
     /// Variance of the output, `rows` rows from the start, for a force of unit variance that begins at zero.
@@ -97,6 +108,11 @@ impl ForcePath {
 /// Inner product of a few numbers.
 fn dot_short(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// y += factor x.
+fn add(factor: f64, x: &[Lane], y: &mut [Lane]) {
+    y.as_flattened_mut().iter_mut().zip(x.as_flattened()).for_each(|(y, x)| *y += factor * x);
 }
 
 /// The rows of a matrix, each filled up with zeros to whole lanes.
@@ -123,50 +139,48 @@ pub(super) struct Filter {
 
 impl Filter {
     /// For stretches of up to `rows` rows and a force of this variance; `None` where it is not finite.
+    ///
+    /// The covariance of the state never appears: from row to row it changes by a matrix of rank one (a white force) or two, whose factors follow a recursion
+    /// of their own (M. Morf, G. S. Sidhu and T. Kailath, IEEE Transactions on Automatic Control 19 (1974), 315).
     pub(super) fn new(path: &ForcePath, pole: f64, variance: f64, rows: usize) -> Option<Self> {
-        let (a, c, added, start) = path.noise(pole);
+        let (a, c) = path.with_force(pole);
         let n = c.len();
         let lanes = n.div_ceil(LANE);
-        // Nothing is allocated within the recursion but the gains.
-        let (by_rows, columns, added) = (padded(&a), padded(&a.transpose()), padded(&(added * variance)));
-        let mut p = padded(&(start * variance));
-        let (mut pc, mut half) = (vec![[0.0; LANE]; lanes], vec![[0.0; LANE]; n * lanes]);
+        let columns = padded(&a.transpose());
+        let (mut rises, mut sizes) = path.first_rise(pole, variance);
+        let (mut power, mut gain) = (1.0_f64, vec![[0.0; LANE]; lanes]);
         let (mut sigmas, mut gains): (Vec<f64>, Vec<Lane>) = (Vec::new(), Vec::new());
-        let whole = padded(&DMatrix::from_row_slice(1, n, c.as_slice()));
-        for k in 0..rows.max(1) {
-            product_of_rows(whole.as_flattened(), &p, lanes, &mut pc);
-            let seen = pc.as_flattened();
-            let power = 1.0 + dot_short(c.as_slice(), seen).max(0.0);
-            gains.resize((k + 1) * lanes, [0.0; LANE]);
-            let (before, gain) = gains.split_at_mut(k * lanes);
-            product_of_rows(seen, &columns, lanes, gain);
-            gain.as_flattened_mut().iter_mut().for_each(|g| *g /= power);
-            for (row, own) in p.chunks_exact_mut(lanes).zip(seen) {
-                row.as_flattened_mut().iter_mut().zip(seen).for_each(|(p, other)| *p -= own * other / power);
-            }
-            // a (p a'), its upper half mirrored.
-            product_of_rows(p.as_flattened(), &columns, lanes, &mut half);
-            product_of_rows(by_rows.as_flattened(), &half, lanes, &mut p);
-            p.as_flattened_mut().iter_mut().zip(added.as_flattened()).for_each(|(p, added)| *p += added);
-            let (all, width) = (p.as_flattened_mut(), lanes * LANE);
-            for i in 0..n {
-                for j in i + 1..n {
-                    all[j * width + i] = all[i * width + j];
-                }
-            }
-            let (sigma, gain) = (power.sqrt(), &gain.as_flattened()[..n]);
-            if !sigma.is_finite() || gain.iter().any(|g| !g.is_finite()) {
+        let mut ahead = rises.clone();
+        for _ in 0..rows.max(1) {
+            let sigma = power.sqrt();
+            let last = gains.len().saturating_sub(lanes);
+            gains.extend(gain.iter().map(|lane| lane.map(|g| g / power)));
+            let (before, own) = gains[last..].as_flattened().split_at(gains[last..].len() * LANE - lanes * LANE);
+            if !sigma.is_finite() || own.iter().any(|g| !g.is_finite()) {
                 return None;
             }
-            let settled = sigmas.last().is_some_and(|last| {
-                let near = |x: f64, y: f64| (x - y).abs() <= SETTLED * (1e-6 + x.abs());
-                let before = before[(k - 1) * lanes..].as_flattened();
-                near(sigma, *last) && gain.iter().zip(before).all(|(x, y)| near(*x, *y))
-            });
+            let near = |x: f64, y: f64| (x - y).abs() <= SETTLED * (1e-6 + x.abs());
+            let settled = sigmas.last().is_some_and(|before| near(sigma, *before))
+                && own.iter().zip(before).all(|(x, y)| near(*x, *y));
             sigmas.push(sigma);
             // The first rows of a chain of integrators see nothing of the force.
             if settled && sigmas.len() > 2 * n + 2 {
                 break;
+            }
+            let seen = [0, 1].map(|i| rises.get(i).map_or(0.0, |rise| dot_short(c.as_slice(), rise.as_flattened())));
+            let told = sizes.map(|row| row[0] * seen[0] + row[1] * seen[1]);
+            let next = power + told[0] * seen[0] + told[1] * seen[1];
+            for (i, row) in sizes.iter_mut().enumerate() {
+                row.iter_mut().zip(told).for_each(|(size, other)| *size += told[i] * other / power);
+            }
+            for ((rise, ahead), told) in rises.iter().zip(&mut ahead).zip(told) {
+                product_of_rows(rise.as_flattened(), &columns, lanes, ahead);
+                add(told, ahead, &mut gain);
+            }
+            power = next;
+            for ((rise, ahead), seen) in rises.iter_mut().zip(&mut ahead).zip(seen) {
+                add(-seen / power, &gain, ahead);
+                std::mem::swap(rise, ahead);
             }
         }
         Some(Self { columns, c: c.as_slice().to_vec(), sigmas, gains })
@@ -298,8 +312,15 @@ mod tests {
         // The covariance written down from the impulse response, for a white and a coloured force.
         for (path, pole) in [(oscillator(), 0.0), (integrator(), 0.0), (oscillator(), 0.75)] {
             let (n, share) = (40, 50.0);
-            let (a, c, added, start) = path.noise(pole);
-            let mut p = start;
+            let (a, c) = path.with_force(pole);
+            // What is added at each row, and what is there at the start.
+            let (mut added, mut p) = (DMatrix::zeros(c.len(), c.len()), DMatrix::zeros(c.len(), c.len()));
+            if pole == 0.0 {
+                added = &path.b * path.b.transpose();
+            } else {
+                let last = c.len() - 1;
+                (added[(last, last)], p[(last, last)]) = (1.0 - pole * pole, 1.0);
+            }
             let covariance = {
                 let mut all = DMatrix::identity(n, n);
                 for i in 0..n {
