@@ -45,6 +45,14 @@ pub struct SurrogateTest {
     pub surrogates: Vec<f64>,
 }
 
+impl SurrogateTest {
+    /// Whether it tells the residual from noise at this level: as many surrogates of a hundred as the level says may come near it, since the residual
+    /// itself is counted among them.
+    pub fn tells(&self, alpha: f64) -> bool {
+        self.p_value <= alpha
+    }
+}
+
 /// A group that is tested.
 #[derive(Debug, Clone, Copy)]
 pub struct Contender<'a> {
@@ -194,7 +202,7 @@ pub fn surrogate_test(
     let bar = statistic - MARGIN;
     let mut surrogates = draw(&rolled, bar, options.alpha);
     let mut p_value = exceeded(&surrogates, bar);
-    if p_value < options.alpha {
+    if p_value <= options.alpha {
         let levels: Vec<Vec<f64>> = layout.series.iter().map(|s| levels(&r[s.rows.clone()])).collect();
         let gaussian = |some: Range<u64>| -> Vec<f64> {
             let one = |b| {

@@ -94,7 +94,7 @@ pub fn explore<'a, 'd>(
     let plain = Setting { noise: NoiseKind::White(1.0 / (1.0 + 2.0 * tau as f64)), ..setting.clone() };
     let plainly = Search::new(plain, options, hooks);
     let murky = none.base.gross() || none.base.far();
-    let shown = test.p_value < options.alpha;
+    let shown = test.tells(options.alpha);
     let mut significant = shown;
     // A slight colour matters where nothing is seen under it.
     let colour = none.base.coloured() || none.base.driven() || (!significant && !none.base.whitener.is_white());

@@ -72,7 +72,7 @@ impl<'d> Remaining<'d> {
         let outdone = outdone || swapped.is_some();
         let foreign = imitates && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
         // What was not looked at is not known to be nothing.
-        let significant = |t: &SurrogateTest| t.p_value < alpha;
+        let significant = |t: &SurrogateTest| t.tells(alpha);
         let imperfect = winner > 0 && (foreign || spectrum || seen.is_some() || test.as_ref().is_none_or(significant));
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
@@ -95,7 +95,7 @@ impl<'d> Remaining<'d> {
         let Some(remaining) = remaining else { return self.open.as_ref().is_some_and(|o| self.stands(o)) };
         let helps = self.open.as_ref().is_some_and(|o| o.block_ratio < BETTER);
         let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
-        self.foreign || self.spectrum || (helps && most && self.test.as_ref().is_some_and(|t| t.p_value < self.alpha))
+        self.foreign || self.spectrum || (helps && most && self.test.as_ref().is_some_and(|t| t.tells(self.alpha)))
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set, where that is `trusted` on other inputs, or in its
