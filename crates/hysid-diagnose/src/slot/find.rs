@@ -336,6 +336,7 @@ impl Finder<'_> {
             let moved = self.motions.iter().find(|m| m.derivative.uses(name)).or(self.motions.first());
             if let Some(motion) = moved {
                 self.offer_motion(&mut slot, motion);
+                self.offer_heat(&mut slot, motion, name);
             } else if let Some(law) = self.force_laws().first() {
                 for symbol in ["v", "x"] {
                     if let Some(q) = law.quantity(symbol) {

@@ -18,6 +18,7 @@ mod connections;
 mod find;
 mod forces;
 mod grounds;
+mod heat;
 mod loops;
 mod motion;
 mod pattern;

@@ -14,17 +14,24 @@ pub static DISSIPATION_HEATING: Mechanism = Mechanism {
     applies: |slot| slot.has("v") && !slot.is_mass(),
     already: &["p*(1 + P*Z)"],
     law: |slot, purpose| {
-        // The power of a force in proportion to the speed, or of one that has a size of its own at any speed.
-        let (power, measure) = if purpose == Purpose::Form(Form::Other) { ("abs(v)", "v") } else { ("v^2", "v^2") };
         // What dissipates less when it is hot heats itself less.
         let share = if slot.dissipates() { "(1 + beta*theta)*" } else { "" };
+        // The power of a force in proportion to the speed, of one that has a size of its own at any speed, or of all that the equations have.
+        let (power, measure) = match purpose {
+            Purpose::Form(Form::Other) => (format!("{share}abs(v)"), "v"),
+            Purpose::Form(Form::Finer) if slot.has("heat") && slot.has("heat_beside") => {
+                ("(1 + beta*theta)*heat + heat_beside".to_owned(), "heat_beside")
+            }
+            Purpose::Form(Form::Finer) if slot.has("heat_beside") => ("heat_beside".to_owned(), "heat_beside"),
+            _ => (format!("{share}v^2"), "v^2"),
+        };
         Law::replace("p*(1 + beta*theta)")
             .amplitude("beta", format!("1/{measure}"), -0.9, 3.0)
             .shape("tau_h", "T", Grid::Values(vec![0.05, 0.2, 0.6]))
             .within(0.01, 5.0)
             // One period of the motion.
             .told_from(TAU, "x/v", "what follows within one period of the motion is a law of the motion")
-            .state("theta", measure, format!("({share}{power} - theta)/tau_h"))
+            .state("theta", measure, format!("({power} - theta)/tau_h"))
     },
     contains: &[],
     confusable: &["parameter_drift", "degradation"],
