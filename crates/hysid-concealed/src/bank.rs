@@ -48,10 +48,16 @@ fn pairable(catalogue: &[Law], at: usize) -> Law {
 
 /// Case `index` of a bank; another law is drawn where the planned one cannot make the difficulty.
 pub fn case(stream: Stream, seed: u64, index: usize) -> Case {
+    case_within(stream, seed, index, usize::MAX)
+}
+
+/// Case `index` of a bank whose recordings have no more than `longest` samples; another one than the bank's own where
+/// that would be longer.
+pub fn case_within(stream: Stream, seed: u64, index: usize, longest: usize) -> Case {
     let mut wanted = plan(stream, seed, index);
     let mut random = Random::for_case(stream, seed, index as u64);
     loop {
-        if let Some(case) = Case::draw(&wanted, &mut random) {
+        if let Some(case) = Case::draw(&wanted, longest, &mut random) {
             return case;
         }
         let outside = wanted.group == Group::Outside;
@@ -60,9 +66,9 @@ pub fn case(stream: Stream, seed: u64, index: usize) -> Case {
     }
 }
 
-/// Cases `range` of a bank, in order, made on all threads.
-pub fn cases(stream: Stream, seed: u64, range: std::ops::Range<usize>) -> Vec<Case> {
-    range.into_par_iter().map(|i| case(stream, seed, i)).collect()
+/// Cases `range` of a bank, as [`case_within`] gives each, in order, made on all threads.
+pub fn cases(stream: Stream, seed: u64, range: std::ops::Range<usize>, longest: usize) -> Vec<Case> {
+    range.into_par_iter().map(|i| case_within(stream, seed, i, longest)).collect()
 }
 
 impl Case {

@@ -7,7 +7,7 @@ use hysid_concealed::strength::residual;
 
 #[test]
 fn cases_reach_their_difficulty_and_come_again() {
-    let cases = bank::cases(Stream::Development, 7, 0..10);
+    let cases = bank::cases(Stream::Development, 7, 0..10, usize::MAX);
     let again = bank::case(Stream::Development, 7, 3);
     assert_eq!(cases[3].csv(&cases[3].est, &cases[3].est.y), again.csv(&again.est, &again.est.y));
     assert_eq!(cases[3].simulation, again.simulation);
@@ -27,6 +27,14 @@ fn cases_reach_their_difficulty_and_come_again() {
                 left.rms
             );
         }
+    }
+}
+
+#[test]
+fn a_bank_of_short_recordings_has_the_plan_of_the_whole() {
+    for case in bank::cases(Stream::Development, 7, 0..8, 1000) {
+        assert_eq!(case.label.samples, 1000, "{}", case.label.id);
+        assert_eq!(case.label.group, bank::plan(Stream::Development, 7, case.label.id[5..].parse().unwrap()).group);
     }
 }
 

@@ -42,10 +42,10 @@ pub struct Args {
     /// Seed of the bank
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Number of cases [default: 240; with --quick 100, of which about 60 are short enough]
+    /// Number of cases [default: 240; 60 with --quick]
     #[arg(long)]
     cases: Option<usize>,
-    /// Leave out cases with more samples than this [default: no limit; 2000 with --quick]
+    /// Leave out cases with more samples than this [default: no limit]
     #[arg(long)]
     longest: Option<usize>,
     /// Begin no further case after this many minutes
@@ -54,8 +54,8 @@ pub struct Args {
     /// First case of the bank to run
     #[arg(long, default_value_t = 0)]
     first: usize,
-    /// About 60 short development cases without the competitors and the proposed experiments; exit status 1 where one of the first
-    /// five targets falls behind its guard
+    /// Development cases of 1000 samples without the competitors and the proposed experiments; exit status 1 where one of the first five
+    /// targets falls behind its guard
     #[arg(long)]
     quick: bool,
     /// Draw from the development stream, which may be tuned on; docs/proof.md is left alone
@@ -84,18 +84,23 @@ pub struct Args {
     out: PathBuf,
 }
 
+/// Cases of `--quick`, and their samples.
+const QUICK: usize = 60;
+const SHORT: usize = 1000;
+
 /// Processes side by side.
 const SIDE_BY_SIDE: usize = 2;
 
 /// Runs the task.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let stream = if args.development || args.quick { Stream::Development } else { Stream::Reporting };
-    let count = args.cases.unwrap_or(if args.quick { 100 } else { 240 });
+    let count = args.cases.unwrap_or(if args.quick { QUICK } else { 240 });
     ensure!(count > 0, "--cases must be at least 1");
     let range = args.first..args.first + count;
-    let longest = args.longest.unwrap_or(if args.quick { 2000 } else { usize::MAX });
+    let longest = args.longest.unwrap_or(usize::MAX);
+    let drawn = if args.quick { SHORT } else { usize::MAX };
     if let Some(root) = &args.write {
-        let mut cases = bank::cases(stream, args.seed, range);
+        let mut cases = bank::cases(stream, args.seed, range, drawn);
         cases.retain(|case| case.label.samples <= longest);
         bank::write(root, &cases)?;
         println!("{} cases written below {}", cases.len(), root.display());
@@ -114,6 +119,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.seed,
         range,
         longest,
+        drawn,
         deadline: args.minutes.map(|m| start + Duration::from_secs(60 * m)),
     };
     let done =
@@ -162,6 +168,8 @@ struct Bank {
     range: Range<usize>,
     /// Cases with more samples are left out.
     longest: usize,
+    /// Cases are drawn with no more samples than this.
+    drawn: usize,
     /// No case is begun after it, so that what is scored is the beginning of the bank and not a choice of quick cases.
     deadline: Option<Instant>,
 }
@@ -184,7 +192,7 @@ impl Bank {
                 if !wanted(&bank::plan(self.stream, self.seed, i)) {
                     continue;
                 }
-                let case = bank::case(self.stream, self.seed, i);
+                let case = bank::case_within(self.stream, self.seed, i, self.drawn);
                 if case.label.samples > self.longest {
                     continue;
                 }

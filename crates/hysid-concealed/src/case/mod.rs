@@ -75,12 +75,12 @@ const PLANTS: [f64; 13] = [25.0, 14.0, 9.0, 7.0, 4.0, 6.0, 4.0, 4.0, 3.0, 3.0, 4
 pub const LEAST_INFORMATION: f64 = 25.0;
 
 impl Case {
-    /// Draws a case; `None` when no draw of this law makes the difficulty asked for.
-    pub fn draw(wanted: &Wanted, random: &mut Random) -> Option<Self> {
-        (0..DRAWS).find_map(|rejected| Self::attempt(wanted, &mut random.fork(), rejected))
+    /// Draws a case of up to `longest` samples; `None` when no draw of this law makes the difficulty asked for.
+    pub fn draw(wanted: &Wanted, longest: usize, random: &mut Random) -> Option<Self> {
+        (0..DRAWS).find_map(|rejected| Self::attempt(wanted, longest, &mut random.fork(), rejected))
     }
 
-    fn attempt(wanted: &Wanted, random: &mut Random, rejected: usize) -> Option<Self> {
+    fn attempt(wanted: &Wanted, longest: usize, random: &mut Random, rejected: usize) -> Option<Self> {
         let control = wanted.group == Group::Control;
         let law = wanted.law.unwrap_or(Law::Coulomb);
         let weights: Vec<f64> =
@@ -93,7 +93,7 @@ impl Case {
             Group::Pair | Group::Triple => random.pick(&[0.5, 1.0, 3.0]),
             Group::Outside => random.pick(&[0.2, 0.5, 1.0, 3.0]),
         };
-        let samples = samples(dnr, random);
+        let samples = samples(dnr, longest, random)?;
         let design = Design::draw(kind, samples, random);
         let noise_kind = wanted.noise.unwrap_or_else(|| {
             [Noise::White, Noise::Autoregressive, Noise::Process, Noise::Outliers]
@@ -209,16 +209,19 @@ fn machine_is_silenced(tuned: &Tuned) -> bool {
     })
 }
 
-/// A length that leaves enough information at this difficulty.
-fn samples(dnr: f64, random: &mut Random) -> usize {
+/// A length up to `longest` that leaves enough information at this difficulty; `None` where there is none.
+fn samples(dnr: f64, longest: usize, random: &mut Random) -> Option<usize> {
     let lengths = [1000, 2000, 4000, 8000, 20_000];
     let weights = [30.0, 30.0, 27.0, 9.0, 4.0];
     let allowed: Vec<f64> = lengths
         .iter()
         .zip(weights)
-        .map(|(n, w)| if dnr > 0.0 && *n as f64 * dnr * dnr < LEAST_INFORMATION { 0.0 } else { w })
+        .map(|(n, w)| {
+            let little = dnr > 0.0 && *n as f64 * dnr * dnr < LEAST_INFORMATION;
+            if little || *n > longest { 0.0 } else { w }
+        })
         .collect();
-    lengths[random.weighted(&allowed)]
+    allowed.iter().any(|w| *w > 0.0).then(|| lengths[random.weighted(&allowed)])
 }
 
 /// A further effect of another family that suits the plant and does not stand in the way of those already there.
