@@ -4,6 +4,7 @@ use hysid_plant::Simulation;
 
 use crate::answer::draw::{Sitting, picture};
 use crate::answer::picture::Picture;
+use crate::answer::reached::one_sided;
 use crate::answer::records::*;
 use crate::budget::{Budget, Step};
 use crate::calibration::fair::calibrate;
@@ -132,6 +133,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.calibrated_parameters = calibrated(&last.base, simulation);
     file.notes.extend(absorbing(&pool[0].base, simulation));
     file.notes.extend(lacking.into_iter().flatten());
+    file.notes.extend(one_sided(best));
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
     let limit = file.correction.as_ref().and_then(|c| told_limit(&c.loudest()?.term));
     let varying = limit.or(varying).or(wanders);

@@ -4,6 +4,7 @@ pub(crate) mod bootstrap;
 pub(crate) mod draw;
 mod locate;
 pub mod picture;
+pub mod reached;
 pub(crate) mod records;
 mod region;
 mod report_values;

@@ -8,7 +8,7 @@ use super::assemble::{Part, assemble};
 use super::finish::finish;
 use super::screen::rewrite_at;
 use crate::budget::Step;
-use crate::mechanism::{Form, Law, Purpose, Role};
+use crate::mechanism::{Amplitudes, Form, Law, Purpose, Role};
 use crate::model::Values;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
@@ -44,6 +44,7 @@ pub fn finer<'d>(
     let present = effect.mechanism.law_at(&effect.slot, effect.written.purpose);
     let now = unknowns(&present);
     let mut forms: Vec<Hypothesis<'d>> = Vec::new();
+    let mut plain_form = None;
     for (purpose, law) in effect.mechanism.forms(&effect.slot) {
         let own = unknowns(&law);
         let worth = match purpose {
@@ -57,21 +58,25 @@ pub fn finer<'d>(
         if setting.budget.omits(Step::Fits) {
             break;
         }
-        forms.extend(written_as(setting, trunk, h, index, &present, (purpose, &law)));
+        let Some(form) = written_as(setting, trunk, h, index, &present, (purpose, &law)) else { continue };
+        forms.push(form);
+        // In the list of merits the present form is the first.
+        plain_form = if purpose == Purpose::Refit { Some(forms.len()) } else { plain_form };
     }
     let merits: Vec<(f64, f64)> =
         std::iter::once(h).chain(&forms).map(|f| (f.log_evidence, f.base.log_likelihood)).collect();
-    let chosen = preferred(&merits, h.log_evidence - trunk.log_evidence > PLAIN_TO_SEE)?;
+    let chosen = preferred(&merits, plain_form, h.log_evidence - trunk.log_evidence > PLAIN_TO_SEE)?;
     chosen.checked_sub(1).map(|i| forms.swap_remove(i))
 }
 
-/// The form to be taken, of their evidences and log likelihoods, the present one first: the one with the most evidence. Where an effect is plain to see, of those that
-/// tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would pass for
-/// another effect.
-fn preferred(merits: &[(f64, f64)], plain: bool) -> Option<usize> {
+/// The form to be taken, of their evidences and log likelihoods, the present one first, the law's plain one at a place: the one with the most evidence. Where an effect
+/// is plain to see, of those that tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would
+/// pass for another effect.
+fn preferred(merits: &[(f64, f64)], plain_form: Option<usize>, plain: bool) -> Option<usize> {
     let most = (0..merits.len()).max_by(|&a, &b| merits[a].0.total_cmp(&merits[b].0))?;
-    // What nothing speaks against stays as it is: a limit alike on both sides of which one was never reached.
-    let top = if merits[0].0 > merits[most].0 - INDIFFERENT { 0 } else { most };
+    // The plain law where nothing speaks against it (a limit alike on both sides of which one was never reached), and else what is there already.
+    let as_good = |i: &usize| merits[*i].0 > merits[most].0 - INDIFFERENT;
+    let top = plain_form.into_iter().chain([0]).find(as_good).unwrap_or(most);
     let (evidence, likelihood) = merits[top];
     let leaves_less = |i: &usize| merits[*i].0 >= evidence - TIE && merits[*i].1 > likelihood + LESS_LEFT;
     let closer = (0..merits.len()).filter(|i| plain && leaves_less(i));
@@ -99,8 +104,10 @@ fn written_as<'d>(
     let (written, _) = rewrite_at(&trunk.base, &trunk.base.document(), &setting.original, mechanism, slot, purpose)?;
     let old = named(present, effect, &values);
     let names = Names::of(law);
-    // What the present form says too is kept; the rest starts at the points of its grid.
-    let kept = |name: &String| old.1.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
+    // What the present form says too is kept; the rest starts at the points of its grid. A lower limit by itself is counted otherwise than the others.
+    let of_two_sides = mechanism.law_at(slot, Purpose::Screening).amplitudes == Amplitudes::OfTwoSides;
+    let mirrored = of_two_sides && effect.written.purpose == Purpose::Form(Form::Few);
+    let kept = |name: &String| old.1.iter().find(|(n, _)| n == name && !mirrored).map(|(_, value)| *value);
     let mut starts: Vec<Vec<Option<f64>>> = Vec::new();
     for point in written.starts() {
         let shapes = names.shapes.iter().zip(point).map(|(name, (_, value))| kept(name).or(Some(value)));
@@ -187,13 +194,16 @@ mod tests {
 
     #[test]
     fn of_forms_that_tie_the_one_that_leaves_the_least_is_taken() {
-        let check = |merits: &[(f64, f64)], plain, expected| assert_eq!(preferred(merits, plain), Some(expected));
+        let check = |merits: &[(f64, f64)], plain, expected| assert_eq!(preferred(merits, None, plain), Some(expected));
         // Evidence and log likelihood of three plays, a density and six plays.
         let near = [(300.0, 315.0), (345.8, 357.0), (345.2, 371.0)];
         check(&near, true, 2);
         check(&near, false, 1);
         check(&[(300.0, 315.0), (345.8, 357.0), (341.0, 371.0)], true, 1);
         check(&[(8.0, 15.0), (7.9, 15.5)], false, 0);
+        // A limit on one side, and the plain one of which the other was never reached.
+        assert_eq!(preferred(&[(57.4, 61.0), (57.39, 61.0)], Some(1), false), Some(1));
+        assert_eq!(preferred(&[(57.4, 61.0), (50.0, 54.0)], Some(1), false), Some(0));
         // A term that brings nothing.
         check(&[(183.5, 188.40), (186.0, 188.39)], true, 1);
     }
