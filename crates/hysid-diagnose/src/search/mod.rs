@@ -43,8 +43,9 @@ use crate::request::{Hooks, Options, Question};
 use crate::slot::Slot;
 use compose::{Ask, SearchOptions, add, compose};
 use fitting::{refit, refit_all, refit_wider};
-use rivals::{outdone_by_a_special_case, short_list, unheard};
+use rivals::{include, outdone_by_a_special_case, short_list, unheard};
 use screen::{Candidate, screen};
+use starts::is_in_a_loop;
 
 /// Composition goes on while the mismatch that remains is significant at this level.
 const STOP_LEVEL: f64 = 0.02;
@@ -126,7 +127,9 @@ impl<'a, 'd> Search<'a, 'd> {
     /// Adds the effects that are fitted alone: the short list, its rivals, the numerics.
     pub fn singles(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
         (self.hooks.progress)("refitting the likeliest effects");
-        for h in refit_all(&self.setting, none, &short_list(candidates, SHORT_LIST)) {
+        let mut list = short_list(candidates, SHORT_LIST);
+        candidates.iter().filter(|c| is_in_a_loop(c)).for_each(|c| include(&mut list, c));
+        for h in refit_all(&self.setting, none, &list) {
             add(pool, h);
         }
         // A drift with an offset is neither of them alone, and both lose to what bends the parameters.

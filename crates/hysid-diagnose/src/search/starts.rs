@@ -9,6 +9,7 @@ use crate::calibration::unfold::calibrated_unfolded;
 use crate::mechanism::mechanism;
 use crate::model::Values;
 use crate::model::hypothesis::{Hypothesis, Setting};
+use crate::slot::Place;
 
 /// Points of a shape grid that a refit starts from.
 const MOST_POINTS: usize = 3;
@@ -58,6 +59,12 @@ const WEAKEST: f64 = 0.01;
 /// Whether a law has no amplitude and its strength is in its shapes.
 pub fn strength_in_shapes(candidate: &Candidate) -> bool {
     candidate.refit.amplitudes.is_empty() && !candidate.refit.neutral.is_empty()
+}
+
+/// Whether a law is written into a loop that the simulation has. A loop that had to follow another shape is bent so far that near it the law explains next to
+/// nothing: neither its score nor its first start tells how well it would do.
+pub fn is_in_a_loop(candidate: &Candidate) -> bool {
+    candidate.slot.place == Place::Loop
 }
 
 /// Shapes of a law that has no amplitude, so that its strength is in them, at a share of their way from where the law does nothing; `None` for other

@@ -13,11 +13,13 @@ pub static PINCHING: Mechanism = Mechanism {
     already: &[],
     law: |slot, purpose| {
         if slot.place == Place::Loop {
+            // A loop that had to follow a pinched one is bent until a slip in its middle explains nothing: a slip aside of it is screened, too.
             return Law::force("zeta_1*exp(-((z*sign(v)/z_u - q_z)/zeta_2)^2)*rate")
                 .amplitude("zeta_1", "1", 0.0, 0.97)
                 .shape("zeta_2", "1", log_grid(0.1, 0.6, 3))
                 .within(0.02, 2.0)
-                .detail(purpose, "q_z", "1", vec![0.1], (-0.5, 0.9))
+                .shape("q_z", "1", Grid::Values(vec![0.1, 0.35]))
+                .within(-0.5, 0.9)
                 .constant("z_u", "z", Grid::Reach("z", vec![1.0]))
                 .silent();
         }
