@@ -8,7 +8,7 @@ use hysid_plant::Simulation;
 use crate::budget::Budget;
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
-use crate::mechanism::{Mechanism, Places, Rewritten, Shape};
+use crate::mechanism::{Amplitudes, Mechanism, Places, Purpose, Rewritten, Shape};
 use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
 use crate::model::{Count, Model, Values};
 use crate::refit::{Held, LmOptions, go_on};
@@ -28,6 +28,11 @@ pub struct Effect {
 }
 
 impl Effect {
+    /// Whether it is a limit, which may act on one side or on both.
+    pub fn is_a_limit(&self) -> bool {
+        self.mechanism.law_at(&self.slot, Purpose::Screening).amplitudes == Amplitudes::OfTwoSides
+    }
+
     /// Its shapes that are moments of a recording.
     pub fn moments(&self) -> impl Iterator<Item = &Shape> {
         self.written.shapes.iter().filter(|shape| shape.places == Places::Moments)

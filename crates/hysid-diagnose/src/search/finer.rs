@@ -8,7 +8,7 @@ use super::assemble::{Part, assemble};
 use super::finish::finish;
 use super::screen::rewrite_at;
 use crate::budget::Step;
-use crate::mechanism::{Amplitudes, Form, Law, Purpose, Role};
+use crate::mechanism::{Form, Law, Purpose, Role};
 use crate::model::Values;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
@@ -65,7 +65,9 @@ pub fn finer<'d>(
     }
     let merits: Vec<(f64, f64)> =
         std::iter::once(h).chain(&forms).map(|f| (f.log_evidence, f.base.log_likelihood)).collect();
-    let chosen = preferred(&merits, plain_form, h.log_evidence - trunk.log_evidence > PLAIN_TO_SEE)?;
+    // A second stop that noise puts where few samples come would be no closer look, but a limit where there is none.
+    let plain = h.log_evidence - trunk.log_evidence > PLAIN_TO_SEE && !effect.is_a_limit();
+    let chosen = preferred(&merits, plain_form, plain)?;
     chosen.checked_sub(1).map(|i| forms.swap_remove(i))
 }
 
@@ -105,8 +107,7 @@ fn written_as<'d>(
     let old = named(present, effect, &values);
     let names = Names::of(law);
     // What the present form says too is kept; the rest starts at the points of its grid. A lower limit by itself is counted otherwise than the others.
-    let of_two_sides = mechanism.law_at(slot, Purpose::Screening).amplitudes == Amplitudes::OfTwoSides;
-    let mirrored = of_two_sides && effect.written.purpose == Purpose::Form(Form::Few);
+    let mirrored = effect.is_a_limit() && effect.written.purpose == Purpose::Form(Form::Few);
     let kept = |name: &String| old.1.iter().find(|(n, _)| n == name && !mirrored).map(|(_, value)| *value);
     let mut starts: Vec<Vec<Option<f64>>> = Vec::new();
     for point in written.starts() {

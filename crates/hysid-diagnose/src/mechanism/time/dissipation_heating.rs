@@ -16,13 +16,11 @@ pub static DISSIPATION_HEATING: Mechanism = Mechanism {
     law: |slot, purpose| {
         // What dissipates less when it is hot heats itself less.
         let share = if slot.dissipates() { "(1 + beta*theta)*" } else { "" };
-        // The power of a force in proportion to the speed, of one that has a size of its own at any speed, or of all that the equations have.
+        // The power of a force in proportion to the speed, of one that has a size of its own at any speed, or of all that the equations have, in which the parameter
+        // is replaced as everywhere.
         let (power, measure) = match purpose {
             Purpose::Form(Form::Other) => (format!("{share}abs(v)"), "v"),
-            Purpose::Form(Form::Finer) if slot.has("heat") && slot.has("heat_beside") => {
-                ("(1 + beta*theta)*heat + heat_beside".to_owned(), "heat_beside")
-            }
-            Purpose::Form(Form::Finer) if slot.has("heat_beside") => ("heat_beside".to_owned(), "heat_beside"),
+            Purpose::Form(Form::Finer) if slot.has("heat") => ("heat".to_owned(), "heat"),
             _ => (format!("{share}v^2"), "v^2"),
         };
         Law::replace("p*(1 + beta*theta)")
