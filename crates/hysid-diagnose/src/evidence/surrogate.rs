@@ -46,8 +46,8 @@ pub struct SurrogateTest {
 }
 
 impl SurrogateTest {
-    /// Whether it tells the residual from noise at this level: as many surrogates of a hundred as the level says may come near it, since the residual
-    /// itself is counted among them.
+    /// Whether it tells the residual from noise at this level. A p-value at the level is enough: the residual itself is counted among the surrogates, so
+    /// that noise has one so small with a probability of the level.
     pub fn tells(&self, alpha: f64) -> bool {
         self.p_value <= alpha
     }

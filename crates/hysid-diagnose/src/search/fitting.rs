@@ -129,8 +129,8 @@ pub const HOPELESS: f64 = 40.0;
 
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
 ///
-/// A few iterations from the best start tell who is hopeless (but in a loop of the simulation); the others are refitted, from all their starts, and those that are near the best then are
-/// refitted to the end. The first is always begun, however little time there is.
+/// A few iterations from the best start tell who is hopeless (but in a loop of the simulation); the others are refitted, from all their starts, and those
+/// that are near the best then are refitted to the end. The first is always begun, however little time there is.
 pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Candidate]) -> Vec<Hypothesis<'d>> {
     let first: Vec<(Vec<Values>, Option<Hypothesis<'d>>)> = list
         .par_iter()
