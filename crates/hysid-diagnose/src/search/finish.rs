@@ -7,22 +7,11 @@ use crate::budget::Step;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Setting};
 
-/// The end of a fit: [`scan`], then [`settle`].
+/// The end of a fit: shapes that least squares cannot move, of the effects from `from` on, then a round under the hypothesis' own noise.
 pub fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
-    scan(setting, h, from);
-    settle(setting, h, from);
-}
-
-/// Moves the shapes that least squares cannot move, of the effects from `from` on.
-pub fn scan<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
     for index in from..h.effects.len() {
         profile_shapes(setting, h, index);
     }
-    h.log_evidence = setting.evidence(&h.base);
-}
-
-/// A round under the hypothesis' own noise, and the gentlest strengths of the effects from `from` on.
-pub fn settle<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
     if setting.budget.omits(Step::Fits) {
         return;
     }

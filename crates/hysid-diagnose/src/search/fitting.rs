@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use super::finer::finer;
-use super::finish::{scan, settle};
+use super::finish::finish;
 use super::screen::{Candidate, with_added_starts};
 use super::starts::{is_in_a_loop, set, starting_values, starts, strength_in_shapes};
 use crate::budget::Step;
@@ -33,8 +33,7 @@ fn sketch<'d>(
 
 /// Refits one candidate on top of a hypothesis' simulation.
 pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
-    let froms = starting_values(setting, parent, candidate);
-    descended(setting, parent, candidate, froms, None).map(|h| settled(setting, parent, h))
+    refit_from(setting, parent, candidate, starting_values(setting, parent, candidate), None)
 }
 
 /// Refits a candidate whose law contains that of `special`, from where that one came to rest.
@@ -60,12 +59,11 @@ pub fn refit_wider<'d>(
         let x = found(&name).or_else(|| shape(&name)).or_else(|| amplitude(&name)).unwrap_or(x);
         set(&mut from, &wider.refit.simulation, &name, x);
     }
-    descended(setting, parent, wider, vec![from], None).map(|h| settled(setting, parent, h))
+    refit_from(setting, parent, wider, vec![from], None)
 }
 
-/// Fits one candidate from these values, shapes that least squares cannot move too; `begun` is a fit that has not converged and goes on in the place of the
-/// first of them.
-fn descended<'d>(
+/// Refits one candidate from these values; `begun` is a fit that has not converged and goes on in the place of the first of them.
+fn refit_from<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'_>,
     candidate: &Candidate,
@@ -94,15 +92,8 @@ fn descended<'d>(
         }
     }
     let mut h = hypothesis(setting, parent, candidate, best?);
-    scan(setting, &mut h, parent.effects.len());
-    Some(h)
-}
-
-/// The end of such a fit: under its own noise, and with the law in the form that has the most evidence.
-fn settled<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, mut h: Hypothesis<'d>) -> Hypothesis<'d> {
-    let added = parent.effects.len();
-    settle(setting, &mut h, added);
-    finer(setting, parent, &h, added).unwrap_or(h)
+    finish(setting, &mut h, parent.effects.len());
+    Some(finer(setting, parent, &h, parent.effects.len()).unwrap_or(h))
 }
 
 /// A fitted candidate as a hypothesis.
@@ -129,8 +120,8 @@ pub const HOPELESS: f64 = 40.0;
 
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
 ///
-/// A few iterations from the best start tell who is hopeless (but in a loop of the simulation); the others are refitted, from all their starts, and those
-/// that are near the best then are refitted to the end. The first is always begun, however little time there is.
+/// A few iterations from the best start tell who is hopeless (but within a loop of the simulation); the others are refitted to the end, from all their
+/// starts. The first is always begun, however little time there is.
 pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Candidate]) -> Vec<Hypothesis<'d>> {
     let first: Vec<(Vec<Values>, Option<Hypothesis<'d>>)> = list
         .par_iter()
@@ -150,20 +141,14 @@ pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Ca
     let fourth = order.get(3).copied().unwrap_or(f64::NEG_INFINITY);
     let last = order.get(MOST_COMPLETE - 1).copied().unwrap_or(f64::NEG_INFINITY);
     let threshold = (best - HOPELESS).min(fourth).max(last);
-    // Each with whether it was fitted to its end but for the noise and the form.
-    let fitted: Vec<(bool, Hypothesis<'d>)> = list
+    let mut out: Vec<Hypothesis<'d>> = list
         .par_iter()
         .zip(first)
         .filter_map(|(c, (froms, sketched))| match sketched {
-            Some(h) if h.log_evidence < threshold && !is_in_a_loop(c) => Some((false, h)),
-            sketched if setting.budget.omits(Step::Fits) => sketched.map(|h| (false, h)),
-            sketched => descended(setting, parent, c, froms, sketched.map(|h| h.base)).map(|h| (true, h)),
+            Some(h) if h.log_evidence < threshold && !is_in_a_loop(c) => Some(h),
+            sketched if setting.budget.omits(Step::Fits) => sketched,
+            sketched => refit_from(setting, parent, c, froms, sketched.map(|h| h.base)),
         })
-        .collect();
-    let near = fitted.iter().map(|(_, h)| h.log_evidence).fold(f64::NEG_INFINITY, f64::max) - HOPELESS;
-    let mut out: Vec<Hypothesis<'d>> = fitted
-        .into_par_iter()
-        .map(|(descended, h)| if descended && h.log_evidence >= near { settled(setting, parent, h) } else { h })
         .collect();
     out.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     out
