@@ -8,7 +8,7 @@ use crate::data::DataSet;
 use crate::evidence::quantile;
 use crate::mechanism::Block;
 use crate::model::along;
-use crate::model::base::{Base, Interval};
+use crate::model::base::Interval;
 use crate::model::hold::FreeRun;
 use crate::model::hypothesis::Hypothesis;
 use crate::slot::Structure;
@@ -43,9 +43,7 @@ pub(crate) struct Sitting<'a, 'd> {
 /// The picture of a diagnosis.
 pub(crate) fn picture(s: &Sitting<'_, '_>) -> Picture {
     let found = !std::ptr::eq(s.none, s.best);
-    let predicted =
-        |base: &Base<'_>| -> Vec<f64> { s.data.y.iter().zip(&base.fit.residual).map(|(y, e)| y - e).collect() };
-    let (first, second) = (predicted(&s.none.base), found.then(|| predicted(&s.best.base)));
+    let (first, second) = (s.none.base.prediction(), found.then(|| s.best.base.prediction()));
     let mut records = records(s, s.data, Role::Estimation, Some(&first), second.as_deref(), None);
     let (before, after) = (s.before.map(|r| r.prediction.as_slice()), s.after.map(|r| r.prediction.as_slice()));
     let scored: Vec<bool> = (0..s.held.rows())

@@ -14,9 +14,11 @@ const AT: f64 = 1.0 - 1e-9;
 
 fn words(h: &Hypothesis<'_>, effect: &Effect) -> Option<String> {
     let (mechanism, slot) = (effect.mechanism, &effect.slot);
-    let alike = effect.written.purpose == Purpose::Refit && effect.is_a_limit();
+    if effect.written.purpose != Purpose::Refit || !effect.is_a_limit() {
+        return None;
+    }
     let limit = h.base.values().parameters.get(&effect.written.shapes.first()?.name).copied()?;
-    let signal = if alike { signal(h, slot.place, &slot.target)? } else { return None };
+    let signal = signal(h, slot.place, &slot.target)?;
     let (above, below) = (signal.iter().any(|x| *x >= AT * limit), signal.iter().any(|x| *x <= -AT * limit));
     let (seen, unseen) = match (above, below) {
         (true, false) => ("upper", "lower"),
@@ -40,8 +42,9 @@ fn signal(h: &Hypothesis<'_>, place: Place, target: &Target) -> Option<Vec<f64>>
         }
         (Place::Sensor, Target::Output(column)) => {
             let at = simulation.outputs.iter().position(|o| o.column == *column)?;
-            let rows = data.layout.series.iter().filter(|s| s.output == at).flat_map(|s| s.rows.clone());
-            Some(rows.map(|row| data.y[row] - h.base.fit.residual[row]).collect())
+            let prediction = h.base.prediction();
+            let series = data.layout.series.iter().filter(|s| s.output == at);
+            Some(series.flat_map(|s| &prediction[s.rows.clone()]).copied().collect())
         }
         _ => None,
     }

@@ -153,15 +153,16 @@ impl Filter {
         let mut ahead = rises.clone();
         for _ in 0..rows.max(1) {
             let sigma = power.sqrt();
-            let last = gains.len().saturating_sub(lanes);
             gains.extend(gain.iter().map(|lane| lane.map(|g| g / power)));
-            let (before, own) = gains[last..].as_flattened().split_at(gains[last..].len() * LANE - lanes * LANE);
+            let (before, own) = gains.as_flattened().split_at((gains.len() - lanes) * LANE);
             if !sigma.is_finite() || own.iter().any(|g| !g.is_finite()) {
                 return None;
             }
             let near = |x: f64, y: f64| (x - y).abs() <= SETTLED * (1e-6 + x.abs());
-            let settled = sigmas.last().is_some_and(|before| near(sigma, *before))
-                && own.iter().zip(before).all(|(x, y)| near(*x, *y));
+            let settled = sigmas.last().is_some_and(|last| {
+                let last_gain = &before[before.len() - own.len()..];
+                near(sigma, *last) && own.iter().zip(last_gain).all(|(x, y)| near(*x, *y))
+            });
             sigmas.push(sigma);
             // The first rows of a chain of integrators see nothing of the force.
             if settled && sigmas.len() > 2 * n + 2 {

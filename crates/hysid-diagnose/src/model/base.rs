@@ -208,6 +208,11 @@ impl Base<'_> {
         data.relative_squares(&left)
     }
 
+    /// The stacked outputs of the fitted simulation.
+    pub fn prediction(&self) -> Vec<f64> {
+        self.model.data().y.iter().zip(&self.fit.residual).map(|(y, e)| y - e).collect()
+    }
+
     /// The document with the fitted values.
     pub fn document(&self) -> Simulation {
         self.model.document(&self.fit.theta)

@@ -44,7 +44,6 @@ pub fn finer<'d>(
     let present = effect.mechanism.law_at(&effect.slot, effect.written.purpose);
     let now = unknowns(&present);
     let mut forms: Vec<Hypothesis<'d>> = Vec::new();
-    let mut plain_form = None;
     for (purpose, law) in effect.mechanism.forms(&effect.slot) {
         let own = unknowns(&law);
         let worth = match purpose {
@@ -58,31 +57,30 @@ pub fn finer<'d>(
         if setting.budget.omits(Step::Fits) {
             break;
         }
-        let Some(form) = written_as(setting, trunk, h, index, &present, (purpose, &law)) else { continue };
-        forms.push(form);
-        // In the list of merits the present form is the first.
-        plain_form = if purpose == Purpose::Refit { Some(forms.len()) } else { plain_form };
+        forms.extend(written_as(setting, trunk, h, index, &present, (purpose, &law)));
     }
     let merits: Vec<(f64, f64)> =
         std::iter::once(h).chain(&forms).map(|f| (f.log_evidence, f.base.log_likelihood)).collect();
+    // In the list of merits the present form is the first.
+    let plain_form = forms.iter().position(|f| f.effects[index].written.purpose == Purpose::Refit).map(|i| i + 1);
     // A second stop that noise puts where few samples come would be no closer look, but a limit where there is none.
-    let plain = h.log_evidence - trunk.log_evidence > PLAIN_TO_SEE && !effect.is_a_limit();
-    let chosen = preferred(&merits, plain_form, plain)?;
+    let closer = h.log_evidence - trunk.log_evidence > PLAIN_TO_SEE && !effect.is_a_limit();
+    let chosen = preferred(&merits, plain_form, closer)?;
     chosen.checked_sub(1).map(|i| forms.swap_remove(i))
 }
 
-/// The form to be taken, of their evidences and log likelihoods, the present one first, the law's plain one at a place: the one with the most evidence. Where an effect
-/// is plain to see, of those that tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would
+/// The form to be taken, of their evidences and log likelihoods, the present one first, the law's plain one at a place: the one with the most evidence. Where a `closer`
+/// look is wanted, at an effect that is plain to see, of those that tie the one that leaves the least, if it leaves less indeed: they say the same, and what a smooth curve leaves of an angular one would
 /// pass for another effect.
-fn preferred(merits: &[(f64, f64)], plain_form: Option<usize>, plain: bool) -> Option<usize> {
+fn preferred(merits: &[(f64, f64)], plain_form: Option<usize>, closer: bool) -> Option<usize> {
     let most = (0..merits.len()).max_by(|&a, &b| merits[a].0.total_cmp(&merits[b].0))?;
     // The plain law where nothing speaks against it (a limit alike on both sides of which one was never reached), and else what is there already.
     let as_good = |i: &usize| merits[*i].0 > merits[most].0 - INDIFFERENT;
     let top = plain_form.into_iter().chain([0]).find(as_good).unwrap_or(most);
     let (evidence, likelihood) = merits[top];
     let leaves_less = |i: &usize| merits[*i].0 >= evidence - TIE && merits[*i].1 > likelihood + LESS_LEFT;
-    let closer = (0..merits.len()).filter(|i| plain && leaves_less(i));
-    closer.max_by(|&a, &b| merits[a].1.total_cmp(&merits[b].1)).or(Some(top))
+    let closest = (0..merits.len()).filter(|i| closer && leaves_less(i));
+    closest.max_by(|&a, &b| merits[a].1.total_cmp(&merits[b].1)).or(Some(top))
 }
 
 /// What a law asks of the recording.
@@ -195,7 +193,8 @@ mod tests {
 
     #[test]
     fn of_forms_that_tie_the_one_that_leaves_the_least_is_taken() {
-        let check = |merits: &[(f64, f64)], plain, expected| assert_eq!(preferred(merits, None, plain), Some(expected));
+        let check =
+            |merits: &[(f64, f64)], closer, expected| assert_eq!(preferred(merits, None, closer), Some(expected));
         // Evidence and log likelihood of three plays, a density and six plays.
         let near = [(300.0, 315.0), (345.8, 357.0), (345.2, 371.0)];
         check(&near, true, 2);
