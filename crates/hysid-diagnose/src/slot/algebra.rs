@@ -155,6 +155,16 @@ fn is_a_sum(simulation: &Simulation, expr: &Expr) -> bool {
     }
 }
 
+/// Whether the equations are linear in the states, with coefficients of parameters only: two runs under the same inputs then differ by what a third
+/// one does, wherever they are.
+pub(crate) fn is_linear(simulation: &Simulation) -> bool {
+    let linear = |e: &Expr| {
+        let mut used = simulation.states.iter().filter(|s| e.uses(&s.name));
+        used.all(|s| constant_coefficient(simulation, e, &s.name).is_some())
+    };
+    simulation.states.iter().all(|s| linear(&s.derivative)) && simulation.outputs.iter().all(|o| linear(&o.expression))
+}
+
 /// Whether a term of the sum is made of estimated parameters only: an offset that the fit already has.
 pub(crate) fn has_free_constant(simulation: &Simulation, expr: &Expr) -> bool {
     let free = |name: &String| simulation.parameter(name).is_some_and(|p| !p.fixed);
@@ -181,6 +191,24 @@ mod tests {
         check("x*k/m + c*x", Some("k/m + c"));
         check("u - v*x", None);
         check("u", None);
+    }
+
+    #[test]
+    fn what_multiplies_a_state_decides_whether_the_equations_are_linear() {
+        let check = |force: &str, output: &str, expected: bool| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_N\"\n[parameters]\nk = {{ value = 9.0, min = 0.1 }}\n[states]\n\
+                 x = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"{force}\", initial = 0.0 }}\n[outputs]\nx_m = \"{output}\"\n"
+            );
+            let simulation = Simulation::parse(&text, "spring.sim.toml").unwrap();
+            assert_eq!(is_linear(&simulation), expected, "{force}, {output}");
+        };
+        check("(u - k*(x - u^2) - 2*v)/k", "x - v/k + abs(u)", true);
+        check("u - k*x - sign(v)", "x", false);
+        check("u - k*x*u", "x", false);
+        check("u - k*x - 0.1*x*v", "x", false);
+        check("u - k*delay(x, 0.1)", "x", false);
+        check("u - k*x", "abs(x)", false);
     }
 
     #[test]

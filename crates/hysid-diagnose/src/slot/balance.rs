@@ -23,18 +23,27 @@ pub(super) fn is_scaled(mass: &Expr) -> bool {
     Factors::of(mass.clone()).take_number().abs() != 1.0
 }
 
-/// A sum of forces times a number over a mass as the sum over the mass in that number's unit; `None` for anything else, and where there is no number.
+/// A force times a number over a mass as the force over the mass in that number's unit; `None` for anything else, and where there is no number.
+///
+/// Before a sum any number stands for a unit; before a single force it does where it is a power of a thousand, since two springs are `2*k*x`.
 fn balance(derivative: &Expr) -> Option<Expr> {
     let mut factors = Factors::of(derivative.clone());
     let number = factors.take_number();
-    let [sum] = <[Expr; 1]>::try_from(factors.above).ok()?;
-    let is_sum = matches!(sum, Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..));
-    // A minus before it all would make the mass negative.
-    if factors.below.is_empty() || !is_sum || !(number > 0.0 && number.is_finite()) || number == 1.0 {
+    let is_sum = matches!(&factors.above[..], [Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..)]);
+    let size = number.abs();
+    let is_a_unit = size.is_normal() && size != 1.0 && (is_sum || is_power_of_a_thousand(size));
+    if factors.below.is_empty() || factors.above.is_empty() || !is_a_unit {
         return None;
     }
-    let mass = product(factors.below);
-    Some(sum / if number < 1.0 { mass * (1.0 / number) } else { mass / number })
+    let (force, mass) = (product(factors.above), product(factors.below));
+    // A minus before it all stays with the force: no mass is negative.
+    let force = if number < 0.0 { -force } else { force };
+    Some(force / if size < 1.0 { mass * (1.0 / size) } else { mass / size })
+}
+
+fn is_power_of_a_thousand(size: f64) -> bool {
+    let times = size.log10() / 3.0;
+    (times - times.round()).abs() < 1e-9
 }
 
 #[cfg(test)]
@@ -54,9 +63,10 @@ mod tests {
             check(&format!("{before}{forces}{after}"), Some("(f - 0.001*c*v - k*x)/(m/1000)"));
         }
         check("0.25*(f - k*x)/m", Some("(f - k*x)/(m*4)"));
-        for other in
-            ["(f - k*x)/m", "-1000*(f - k*x)/m", "1000*(f - k*x)", "1000*k*(f - x)/m", "1000*f/m", "f - 1000*x/m"]
-        {
+        check("-1000*(c*v + k*x)/m", Some("-(c*v + k*x)/(m/1000)"));
+        check("-1000*k*x/m", Some("-(k*x)/(m/1000)"));
+        check("1000*f/m", Some("f/(m/1000)"));
+        for other in ["(f - k*x)/m", "-(f - k*x)/m", "1000*(f - k*x)", "2*k*(f - x)/m", "1000/m", "f - 1000*x/m"] {
             check(other, None);
         }
         let scaled = |mass: &str| is_scaled(&Expr::parse(mass).unwrap());

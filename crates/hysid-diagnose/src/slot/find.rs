@@ -62,6 +62,11 @@ pub(super) fn is_one_of(unit: &Unit, names: &[&str]) -> bool {
     names.iter().filter_map(|name| Unit::parse(name).ok()).any(|u| u.same_dimension(unit))
 }
 
+/// Whether what has this unit presses upon something: a force, a moment, a pressure.
+pub(super) fn presses(unit: &Unit) -> bool {
+    is_one_of(unit, &["N", "N m", "Pa"])
+}
+
 /// Whether a unit is known and measures the same as one of these.
 pub(super) fn has_unit(unit: Option<Unit>, names: &[&str]) -> bool {
     unit.is_some_and(|u| is_one_of(&u, names))

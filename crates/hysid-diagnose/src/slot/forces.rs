@@ -4,7 +4,7 @@ use hysid_plant::{Expr, Output, State};
 
 use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, quotient, size};
 use super::balance::is_scaled;
-use super::find::{Finder, has_unit, is_one_of};
+use super::find::{Finder, has_unit, presses};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
 use super::{Place, Pull, Slot, Target};
 
@@ -62,12 +62,13 @@ impl Finder<'_> {
 
     /// The inputs that press, by their unit or for all that is known, and that the simulation as the user wrote it makes no use of, as they are offered.
     pub(super) fn idle_loads(&self) -> Vec<String> {
-        let presses = |symbol: &str| {
+        let idle = |symbol: &str| {
             !self.original.expressions().into_iter().any(|(_, e)| e.uses(symbol))
-                && self.simulation.unit_of(symbol).is_none_or(|u| is_one_of(&u, &["N", "N m", "Pa"]))
+                && self.simulation.unit_of(symbol).is_none_or(|u| presses(&u))
+                && self.kinematic_input(symbol) == Kinematic::Neither
         };
         let inputs = (1..).zip(&self.simulation.inputs);
-        inputs.filter(|(_, i)| presses(&i.symbol)).map(|(i, _)| format!("u_{i}")).collect()
+        inputs.filter(|(_, i)| idle(&i.symbol)).map(|(i, _)| format!("u_{i}")).collect()
     }
 
     pub(super) fn motion_slot(&self, place: Place, label: String, motion: &Motion<'_>) -> Slot {

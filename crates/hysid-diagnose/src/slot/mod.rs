@@ -32,8 +32,12 @@ use std::fmt::{self, Display, Formatter};
 
 use hysid_plant::{Expr, Function, Simulation, Unit};
 
+use find::{is_one_of, presses};
+use stores::ELECTRICAL;
+
 pub use find::Structure;
 
+pub(crate) use algebra::is_linear;
 pub(crate) use balance::with_balances;
 pub(crate) use loops::play_of;
 pub(crate) use motion::{ForcePath, force_path};
@@ -223,10 +227,12 @@ impl Slot {
     }
 
     /// The recorded inputs that may load a guide here, as they are offered: first those that the simulation makes no use of (somebody recorded a clamping
-    /// force), then those that enter the equations here.
+    /// force), then those that enter the equations here. In a static force law the motion enters too, which loads nothing.
     pub(crate) fn loads(&self) -> Vec<String> {
-        let others = self.entering().into_iter().filter(|u| !self.idle_loads.contains(u));
-        self.idle_loads.iter().cloned().chain(others).collect()
+        let pressing = |u: &String| self.quantity(u).and_then(|q| q.unit.as_ref()).is_some_and(presses);
+        let mut others = self.entering();
+        others.retain(|u| !self.idle_loads.contains(u) && (self.place != Place::ForceLaw || pressing(u)));
+        [&self.idle_loads[..], &others].concat()
     }
 
     /// Whether a parameter of its own is added to the force or to the output here: an offset.
@@ -344,6 +350,11 @@ impl Slot {
     /// Whether what leaves this store by its own outflow arrives in another one.
     pub(crate) fn feeds_another(&self) -> bool {
         self.feeds
+    }
+
+    /// Whether what is held here is electrical, which leaves through a resistance and through no opening.
+    pub(crate) fn is_electrical(&self) -> bool {
+        self.quantity("s").and_then(|q| q.unit.as_ref()).is_some_and(|u| is_one_of(u, ELECTRICAL))
     }
 
     /// Whether the equations here contain a square root of an expression that uses this symbol.

@@ -7,6 +7,9 @@ use super::motion::CHARGED;
 use super::pattern::roots;
 use super::{Place, Pull, Slot, Target};
 
+/// Units of electrical states.
+pub(super) const ELECTRICAL: &[&str] = &["Wb", "A", "C", "V"];
+
 impl Finder<'_> {
     pub(super) fn store_slot(&self, place: Place, label: String, name: &str, derivative: &Expr) -> Slot {
         let target = Target::Derivatives(vec![Pull::new(name, 1.0)]);
@@ -46,7 +49,7 @@ impl Finder<'_> {
     /// measured the law stands there, and acts on both.
     pub(super) fn circuits(&self) -> Vec<Slot> {
         let mut slots = self.held(Place::Circuit, |name| {
-            let electrical = has_unit(self.simulation.unit_of(name), &["Wb", "A", "C", "V"]);
+            let electrical = has_unit(self.simulation.unit_of(name), ELECTRICAL);
             self.motions.is_empty() && electrical && !self.feels_its_current(name)
         });
         for slot in &mut slots {

@@ -9,8 +9,8 @@ pub static LOAD_DEPENDENT_FRICTION: Mechanism = Mechanism {
     id: "load_dependent_friction",
     family: Family::DryFriction,
     block: Block::Damping,
-    places: &[Place::Force],
-    applies: |slot| slot.has("v") && slot.has("u"),
+    places: &[Place::Force, Place::ForceLaw],
+    applies: |slot| slot.has("v") && slot.has("u") && (slot.place != Place::ForceLaw || !slot.loads().is_empty()),
     already: &["abs(u)*sign(v)"],
     law: |slot, purpose| {
         let loads = loads(slot, purpose);
@@ -74,5 +74,23 @@ mod tests {
             Simulation::parse(&text.replace("F/m", "(F - 0.1*abs(F_n)*sign(v))/m"), "slide.sim.toml").unwrap();
         let structure = Structure::within(&with_it, &original);
         assert_eq!(structure.slots.iter().find(|s| s.place == Place::Force).unwrap().loads(), ["u_3", "u_2"]);
+    }
+
+    #[test]
+    fn a_test_bench_is_loaded_by_a_force_beside_its_motion() {
+        let loads = |third: &str, law: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nx = \"x_mm\"\nv = \"v_mm_s\"\ng = \"{third}\"\n[parameters]\nk = {{ value = 2.0, min = 0.1, unit = \"N/mm\" }}\n\
+                 [outputs]\nforce_N = \"{law}\"\n"
+            );
+            let structure = Structure::of(&Simulation::parse(&text, "bench.sim.toml").unwrap());
+            let slot = structure.slots.into_iter().find(|s| s.place == Place::ForceLaw).unwrap();
+            (slot.loads(), LOAD_DEPENDENT_FRICTION.fits(&slot))
+        };
+        assert_eq!(loads("clamp_N", "k*x"), (vec!["u_3".to_owned()], true));
+        assert_eq!(loads("clamp_N", "k*x + 0.1*g"), (vec!["u_3".to_owned()], true));
+        // What is moved, or is warm, presses upon nothing.
+        assert_eq!(loads("y_mm", "k*x"), (vec![], false));
+        assert_eq!(loads("temp_K", "k*x + 0.1*g"), (vec![], false));
     }
 }

@@ -13,8 +13,8 @@ pub static LEAKAGE: Mechanism = Mechanism {
     already: &[],
     law: |slot, purpose| {
         // A loss in proportion would be a change of a parameter where the baseline has one, and one through an opening where what leaves through one is lost.
-        let opening = slot.has("k") || slot.feeds_another();
-        let other = purpose == Purpose::Form(Form::Other) && !slot.has("k");
+        let opening = (slot.has("k") || slot.feeds_another()) && !slot.is_electrical();
+        let other = purpose == Purpose::Form(Form::Other) && !slot.has("k") && !slot.is_electrical();
         if opening != other {
             // Torricelli's law; the reference level keeps the unit of q_l that of a flow.
             Law::outflow("q_l*sqrt(max(s, 0)/s_r)").amplitude("q_l", "F", 0.0, 2.0).constant(
@@ -56,6 +56,19 @@ mod tests {
         for (label, first) in [("state:h1", true), ("state:h2", false)] {
             assert_eq!(law(label, Purpose::Refit).contains("sqrt"), first, "{label}");
             assert_eq!(law(label, Purpose::Form(Form::Other)).contains("sqrt"), !first, "{label}");
+        }
+    }
+
+    #[test]
+    fn a_charge_leaks_in_proportion() {
+        let text = "[time]\ncolumn = \"t_s\"\n[inputs]\nu = \"src_V\"\n[parameters]\nR = { value = 10.0, fixed = true, unit = \"kOhm\" }\n\
+                    C = { value = 8.0, min = 1.0, unit = \"uF\" }\n[states]\nv = { derivative = \"1000*(u - v)/(R*C)\", initial = 0.0, unit = \"V\" }\n\
+                    [outputs]\nend_mV = \"1000*v\"\n";
+        let structure = Structure::of(&Simulation::parse(text, "ladder").unwrap());
+        let slots = LEAKAGE.slots(&structure);
+        assert_eq!(slots.len(), 1);
+        for purpose in [Purpose::Screening, Purpose::Refit, Purpose::Form(Form::Other)] {
+            assert!(!format!("{:?}", LEAKAGE.law_at(&slots[0], purpose).change).contains("sqrt"), "{purpose:?}");
         }
     }
 }
