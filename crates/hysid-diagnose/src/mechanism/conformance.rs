@@ -45,7 +45,8 @@ specimens!(
     "stage",
     "brace",
     "bearing",
-    "stack"
+    "stack",
+    "tower"
 );
 
 /// A breach of the suite's laws.
@@ -220,6 +221,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.002, 20.0),
     (0.002, 4.0),
     (0.01, 40.0),
+    (0.02, 10.0),
 ];
 
 /// A bench for each specimen.

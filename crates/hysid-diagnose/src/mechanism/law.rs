@@ -19,6 +19,8 @@ pub enum Change {
     Drive(String),
     /// A rate taken from the derivative of a store.
     Outflow(String),
+    /// What is added to each output that sees a motion, in their order.
+    Outputs(Vec<String>),
     /// An expression that replaces the input, the parameter, the output or the half-widths of the slot.
     Replace(String),
     /// The acceleration becomes (force - `force`)/(mass + `mass`).
@@ -169,6 +171,11 @@ impl Law {
     /// What stands instead of the slot's input, parameter or output.
     pub fn replace(text: impl Into<String>) -> Self {
         Self::new(Change::Replace(text.into()))
+    }
+
+    /// What each output that sees the motion gets besides.
+    pub fn outputs(texts: Vec<String>) -> Self {
+        Self::new(Change::Outputs(texts))
     }
 
     /// A mass that is not constant and the force that comes with it.

@@ -38,6 +38,7 @@ fn law_text(law: &Law) -> String {
         Change::Drive(text) => format!("external force `{text}`"),
         Change::Outflow(text) => format!("outflow `{text}`"),
         Change::Replace(text) => format!("becomes `{}`", folded(text)),
+        Change::Outputs(texts) => format!("added to the outputs `{}`", texts.join("`, `")),
         Change::Inertia { force, mass } => format!("further mass `{mass}` with the force `{force}`"),
         Change::Separation { at, by } => {
             format!("the simulation's own separation becomes `{by}`, where `ahead` is the separation at `{at}`")
@@ -58,6 +59,7 @@ fn place_name(place: Place) -> &'static str {
         Place::Store => "store",
         Place::Circuit => "first-order electrical state",
         Place::Sensor => "sensor",
+        Place::Sensors => "sensors of one part",
         Place::Parameter => "parameter",
         Place::Disturbance => "disturbance",
     }

@@ -158,6 +158,13 @@ fn enter(simulation: &mut Simulation, slot: &Slot, change: &Change, writer: &Wri
             }
             Ok(())
         }
+        (Target::Outputs(seen), Change::Outputs(texts)) => {
+            for (seen, text) in seen.iter().zip(texts) {
+                let output = simulation.output_mut(&seen.column).ok_or("the output is gone")?;
+                output.expression = output.expression.clone() + writer.text(text)?;
+            }
+            Ok(())
+        }
         (Target::Derivatives(states), Change::Force(text) | Change::Drive(text) | Change::Outflow(text)) => {
             let force = writer.text(text)?;
             let resists = if matches!(change, Change::Drive(_)) { -1.0 } else { 1.0 };

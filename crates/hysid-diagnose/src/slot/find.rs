@@ -35,6 +35,7 @@ impl Structure {
         slots.extend(finder.stores());
         slots.extend(finder.circuits());
         slots.extend(finder.sensors());
+        slots.extend(finder.sensors_together());
         slots.extend(finder.parameters());
         slots.extend(finder.disturbances());
         let sensed = sensed(original);

@@ -22,6 +22,7 @@ mod heat;
 mod loops;
 mod motion;
 mod pattern;
+mod seen;
 mod sensed;
 mod stores;
 mod target;
@@ -42,7 +43,7 @@ pub(crate) use balance::with_balances;
 pub(crate) use loops::play_of;
 pub(crate) use motion::{ForcePath, force_path};
 pub(crate) use sensed::{Sensed, sensed};
-pub(crate) use target::{Pull, Target};
+pub(crate) use target::{Pull, Rate, Seen, Target};
 pub(crate) use turn::{is_turn, with_turns, with_used_turns};
 
 /// Signs of a velocity that a simulation may have: the sharp one, then the smoothed ones that may stand in its place.
@@ -93,6 +94,8 @@ pub enum Place {
     Circuit,
     /// The measured output, as a sensor.
     Sensor,
+    /// What the sensors of one moving part see together: several of them, or an accelerometer.
+    Sensors,
     /// A parameter.
     Parameter,
     /// An external force or flow.
@@ -215,6 +218,14 @@ impl Slot {
     /// The number of inputs of the simulation, offered as `u_1`, `u_2`, ...
     pub fn inputs(&self) -> usize {
         self.inputs
+    }
+
+    /// What the outputs that see the motion here measure of it, each offered as `y_1`, `y_2`, ...
+    pub(crate) fn seen(&self) -> &[Seen] {
+        match &self.target {
+            Target::Outputs(seen) => seen,
+            _ => &[],
+        }
     }
 
     /// The inputs that enter the equations here, as they are offered.

@@ -9,6 +9,8 @@ pub(crate) enum Target {
     Derivatives(Vec<Pull>),
     /// Added to this output.
     Output(String),
+    /// What each of these outputs sees is added to it.
+    Outputs(Vec<Seen>),
     /// Replaces this symbol in every equation.
     Symbol(String),
     /// Replaces this symbol in the derivatives of these states. Where the signal is a sum, the expression is what it holds besides the
@@ -18,6 +20,23 @@ pub(crate) enum Target {
     PartIn(Expr, Vec<String>),
     /// Replaces the half-width of every play of this symbol; `r` stands for what it was.
     HalfWidths(String),
+}
+
+/// An output that sees the motion of a part.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Seen {
+    /// Its column.
+    pub column: String,
+    /// Which derivative of the displacement it measures.
+    pub rate: Rate,
+}
+
+/// Which derivative of a displacement is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rate {
+    Displacement,
+    Velocity,
+    Acceleration,
 }
 
 /// A state whose derivative a force changes, and how.

@@ -1,7 +1,7 @@
 //! A resonance that the simulation lacks.
 
 use crate::mechanism::{Block, Family, Grid, Law, Mechanism, Need};
-use crate::slot::Place;
+use crate::slot::{Place, Rate, Seen};
 
 /// Damping ratio beyond which there is no resonance to speak of, which would be one and a third times its static gain: a broad one beside a first-order
 /// plant imitates whatever is slow.
@@ -12,7 +12,7 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
     id: "unmodelled_mode",
     family: Family::ExtraMode,
     block: Block::Inertia,
-    places: &[Place::Force, Place::Sensor],
+    places: &[Place::Force, Place::Sensor, Place::Sensors],
     applies: |slot| slot.inputs() > 0,
     already: &[],
     law: |slot, _| {
@@ -34,6 +34,12 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
                 law.state("d_a", "v*t", "v - v_a").state("v_a", "v", acceleration).starting_like("v")
             };
         }
+        if slot.place == Place::Sensors {
+            return seen_together(slot.seen())
+                .shape("f_a", "1/t", frequencies)
+                .shape("zeta_a", "1", dampings)
+                .within(0.001, BROADEST);
+        }
         // A mode of its own beside the plant, seen by the sensor.
         let drive: String = (1..=slot.inputs()).map(|i| format!("b_{i}*u_{i} + ")).collect();
         let mut law = Law::replace("y + q_a").state("q_a", "y", "p_a").state(
@@ -53,3 +59,19 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
     signature: "The residual lives in a narrow band, grows in proportion to the input, and its phase flips there.",
     reference: "D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000)",
 };
+
+/// A mode of its own beside the plant that each of these sensors sees: how much of it depends on where they stand, which derivative on what they measure.
+fn seen_together(seen: &[Seen]) -> Law {
+    let omega = "(2*pi*f_a)";
+    let texts = (1..).zip(seen).map(|(i, seen)| match seen.rate {
+        Rate::Displacement => format!("b_{i}*q_a"),
+        Rate::Velocity => format!("b_{i}*p_a/{omega}"),
+        Rate::Acceleration => format!("b_{i}*(u - q_a - 2*zeta_a*p_a/{omega})"),
+    });
+    let law = Law::outputs(texts.collect()).state("q_a", "u", "p_a").state(
+        "p_a",
+        "u/t",
+        format!("{omega}^2*(u - q_a) - 2*zeta_a*{omega}*p_a"),
+    );
+    (1..=seen.len()).fold(law, |law, i| law.amplitude(format!("b_{i}"), format!("y_{i}/u"), -3.0, 3.0))
+}
