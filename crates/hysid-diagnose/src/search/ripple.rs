@@ -81,7 +81,11 @@ fn scores<'s>(base: &Base<'_>, slots: impl Iterator<Item = &'s Slot>, r: &[f64])
                 let output = document.output_mut(column)?;
                 output.expression = output.expression.clone() + push;
             }
-            Target::Symbol(_) | Target::SymbolIn(..) | Target::PartIn(..) | Target::HalfWidths(_) | Target::Outputs(_) => return None,
+            Target::Symbol(_)
+            | Target::SymbolIn(..)
+            | Target::PartIn(..)
+            | Target::HalfWidths(_)
+            | Target::Outputs(_) => return None,
         }
     }
     let data = base.model.data().with_still_inputs(document.inputs.len() - own);

@@ -12,8 +12,7 @@ impl Finder<'_> {
     pub(super) fn sensors_together(&self) -> Option<Slot> {
         let ([motion], [_]) = (&self.motions[..], &self.simulation.inputs[..]) else { return None };
         let accelerations = sensed(self.original);
-        let accelerates =
-            |o: &Output| accelerations.iter().any(|s| s.column == o.column && s.state == motion.state);
+        let accelerates = |o: &Output| accelerations.iter().any(|s| s.column == o.column && s.state == motion.state);
         let outputs = self.simulation.outputs.iter();
         let seen: Vec<Seen> = outputs
             .filter_map(|o| {
