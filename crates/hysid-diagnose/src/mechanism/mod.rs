@@ -11,6 +11,7 @@
 
 pub mod conformance;
 mod copies;
+mod enter;
 mod excitation;
 mod family;
 mod form;

@@ -11,7 +11,7 @@ use crate::calibration::lesson::{Done, Lesson, lesson};
 use crate::evidence::correlation_time;
 use crate::file::DetectableRecord;
 use crate::model::base::{Base, NoiseKind};
-use crate::model::hypothesis::{Hypothesis, Setting};
+use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::request::{Hooks, Request, words};
 
 /// What was found on one calibration.
@@ -55,6 +55,20 @@ fn clear(pool: &[Hypothesis<'_>]) -> Option<Vec<&'static str>> {
     let best = best_of(pool)?;
     let sets: Vec<(Vec<&str>, f64)> = pool.iter().map(|h| (h.families(), h.log_evidence)).collect();
     leads_clearly(best, &sets).then(|| pool[best].families())
+}
+
+/// Log evidence by which shorter steps may move the gain of a set and have told nothing.
+const MOVED: f64 = 2.0;
+
+/// What each set gains over the simulation without effects.
+fn gains(none: &Hypothesis<'_>, sets: &[Hypothesis<'_>]) -> Vec<(Key, f64)> {
+    sets.iter().map(|h| (h.key(), h.log_evidence - none.log_evidence)).collect()
+}
+
+/// Whether all sets that were fitted with shorter steps gain what they gained before.
+fn unmoved(before: &[(Key, f64)], now: &[(Key, f64)]) -> bool {
+    let held = |(key, gain): &(Key, f64)| before.iter().any(|(k, g)| k == key && (gain - g).abs() < MOVED);
+    !now.is_empty() && now.iter().all(held)
 }
 
 /// Looks for what is missing around a calibrated simulation; where that teaches something of the simulation itself, once more, up to so many
@@ -166,10 +180,12 @@ pub fn explore<'a, 'd>(
             let finely = Search::new(next, options, hooks);
             // The next search begins under the first noise model; here everything is judged under the one that decided.
             let Some(base) = recalibrated(&finely.setting, &lesson.base, None) else { return again(lesson) };
+            let coarsely = gains(&none, &pool);
             let none = finely.setting.hypothesis(Vec::new(), base);
             let sets = finely.under_noise(&none, &pool);
-            // Where the matter is not as clear with shorter steps, their error may have misled the whole search.
-            let settled = clear(&pool).is_some_and(|families| clear(&sets).is_some_and(|now| now == families));
+            // Where the matter is not as clear with shorter steps, their error may have misled the whole search; not where it has moved nothing.
+            let settled = clear(&pool).is_some_and(|families| clear(&sets).is_some_and(|now| now == families))
+                || unmoved(&coarsely, &gains(&none, &sets));
             if !settled && !lesson.only_fits {
                 return again(lesson);
             }
@@ -204,7 +220,16 @@ pub fn explore<'a, 'd>(
 
 #[cfg(test)]
 mod tests {
-    use super::leads_clearly;
+    use super::{leads_clearly, unmoved};
+
+    #[test]
+    fn shorter_steps_tell_nothing_where_no_gain_moves() {
+        let set = |slot: &str, gain: f64| (vec![("delay", slot.to_owned())], gain);
+        let before = [set("input:u", 140.0), set("output:y", 139.0), set("input:w", 20.0)];
+        assert!(unmoved(&before, &[set("output:y", 139.4), set("input:u", 141.0)]));
+        assert!(!unmoved(&before, &[set("output:y", 139.4), set("input:u", 100.0)]));
+        assert!(!unmoved(&before, &[set("input:z", 139.4)]) && !unmoved(&before, &[]));
+    }
 
     #[test]
     fn a_lead_is_clear_over_other_families_only() {
