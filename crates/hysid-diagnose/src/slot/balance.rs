@@ -31,7 +31,7 @@ fn balance(derivative: &Expr) -> Option<Expr> {
     let number = factors.take_number();
     let is_sum = matches!(&factors.above[..], [Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..)]);
     let size = number.abs();
-    let is_a_unit = size.is_normal() && size != 1.0 && (is_sum || is_power_of_a_thousand(size));
+    let is_a_unit = size.is_normal() && size != 1.0 && (is_sum || is_power_of_ten(size, 3.0));
     if factors.below.is_empty() || factors.above.is_empty() || !is_a_unit {
         return None;
     }
@@ -41,8 +41,9 @@ fn balance(derivative: &Expr) -> Option<Expr> {
     Some(force / if size < 1.0 { mass * (1.0 / size) } else { mass / size })
 }
 
-fn is_power_of_a_thousand(size: f64) -> bool {
-    let times = size.log10() / 3.0;
+/// Whether a number is a whole power of ten to the `decades`, but for its sign: it may be nothing but a change of the unit.
+pub(super) fn is_power_of_ten(number: f64, decades: f64) -> bool {
+    let times = number.abs().log10() / decades;
     (times - times.round()).abs() < 1e-9
 }
 

@@ -22,6 +22,7 @@ impl Structure {
     /// The slots of a simulation that effects have been written into: those of the `original`, with what stands there now.
     pub fn within(simulation: &Simulation, original: &Simulation) -> Self {
         let finder = Finder { simulation, original, motions: motions(simulation, original) };
+        let sensed = sensed(original);
         let mut slots = Vec::new();
         slots.extend(finder.inputs());
         slots.extend(finder.cascades());
@@ -35,10 +36,9 @@ impl Structure {
         slots.extend(finder.stores());
         slots.extend(finder.circuits());
         slots.extend(finder.sensors());
-        slots.extend(finder.sensors_together());
+        slots.extend(finder.sensors_together(&sensed));
         slots.extend(finder.parameters());
         slots.extend(finder.disturbances());
-        let sensed = sensed(original);
         let idle_loads = finder.idle_loads();
         for slot in &mut slots {
             if let Target::Derivatives(states) = &slot.target {

@@ -4,14 +4,13 @@ use hysid_plant::Output;
 
 use super::find::Finder;
 use super::motion::Motion;
-use super::{Place, Rate, Seen, Slot, Target, sensed};
+use super::{Place, Rate, Seen, Sensed, Slot, Target};
 
 impl Finder<'_> {
     /// The sensors of the only part that moves, where they are several or measure its acceleration: what one that measures the displacement sees is told by
     /// itself.
-    pub(super) fn sensors_together(&self) -> Option<Slot> {
+    pub(super) fn sensors_together(&self, accelerations: &[Sensed]) -> Option<Slot> {
         let ([motion], [_]) = (&self.motions[..], &self.simulation.inputs[..]) else { return None };
-        let accelerations = sensed(self.original);
         let accelerates = |o: &Output| accelerations.iter().any(|s| s.column == o.column && s.state == motion.state);
         let outputs = self.simulation.outputs.iter();
         let seen: Vec<Seen> = outputs

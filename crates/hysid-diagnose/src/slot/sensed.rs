@@ -5,6 +5,7 @@ use hysid_plant::{BinaryOp, ClockSource, Compiled, Drive, Expr, Output, Paramete
 use rand_pcg::rand_core::Rng;
 
 use super::algebra::{Factors, product};
+use super::balance::is_power_of_ten;
 use super::find::is_one_of;
 use crate::random::generator;
 
@@ -43,7 +44,7 @@ pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
                 let units = measures_a_rate(simulation, output, state);
                 let of_terms = || if states_in(simulation, &inner, rate) > 1 { alike(false) } else { None };
                 let converted = || with_any_numbers.or_else(of_terms);
-                (units != Some(false)).then(converted).flatten().filter(|t| units.is_some() || is_power_of_ten(*t))
+                (units != Some(false)).then(converted).flatten().filter(|t| units.is_some() || is_power_of_ten(*t, 1.0))
             };
             if let Some(times) = times {
                 found.push(Sensed { state: (*state).clone(), column: output.column.clone(), times });
@@ -67,12 +68,6 @@ fn measures_a_rate(simulation: &Simulation, output: &Output, state: &str) -> Opt
     let measured = Unit::of_column(&output.column)?;
     // Of an accelerometer `g` is no gram.
     Some(measured.same_dimension(&rate) || (is_one_of(&measured, &["g"]) && is_one_of(&rate, &["m/s^2"])))
-}
-
-/// Whether a multiple may be nothing but a change of the unit.
-fn is_power_of_ten(times: f64) -> bool {
-    let decades = times.abs().log10();
-    (decades - decades.round()).abs() < 1e-9
 }
 
 /// How many states two expressions have in common.
