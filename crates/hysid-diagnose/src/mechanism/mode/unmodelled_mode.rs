@@ -16,41 +16,11 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
     applies: |slot| slot.inputs() > 0,
     already: &[],
     law: |slot, _| {
-        // A sharp resonance between two points of the grid shows in neither; a broad one does.
-        let (frequencies, dampings) = (Grid::Band(25), Grid::Values(vec![0.02, 0.15]));
-        if slot.place == Place::Force {
-            // A mass on a spring that hangs on the moving part: the force that accelerates it is missing there. Where only the velocity of the
-            // part is known, the spring's length stands for the two places.
-            let length = if slot.has("x") { "(x - x_a)" } else { "d_a" };
-            let acceleration = format!("(2*pi*f_a)^2*{length} + 4*pi*f_a*zeta_a*(v - v_a)");
-            let law = Law::force(format!("m_a*({acceleration})"))
-                .amplitude("m_a", slot.mass_measure(), 0.0, 5.0)
-                .shape("f_a", "1/t", frequencies)
-                .shape("zeta_a", "1", dampings)
-                .within(0.001, BROADEST);
-            return if slot.has("x") {
-                law.state("x_a", "x", "v_a").starting_like("x").state("v_a", "x/t", acceleration).starting_like("v")
-            } else {
-                law.state("d_a", "v*t", "v - v_a").state("v_a", "v", acceleration).starting_like("v")
-            };
-        }
-        if slot.place == Place::Sensors {
-            return seen_together(slot.seen())
-                .shape("f_a", "1/t", frequencies)
-                .shape("zeta_a", "1", dampings)
-                .within(0.001, BROADEST);
-        }
-        // A mode of its own beside the plant, seen by the sensor.
-        let drive: String = (1..=slot.inputs()).map(|i| format!("b_{i}*u_{i} + ")).collect();
-        let mut law = Law::replace("y + q_a").state("q_a", "y", "p_a").state(
-            "p_a",
-            "y/t",
-            format!("(2*pi*f_a)^2*({drive}-q_a) - 4*pi*f_a*zeta_a*p_a"),
-        );
-        for i in 1..=slot.inputs() {
-            law = law.amplitude(format!("b_{i}"), format!("y/u_{i}"), -3.0, 3.0);
-        }
-        law.shape("f_a", "1/t", frequencies).shape("zeta_a", "1", dampings).within(0.001, BROADEST)
+        tuned(match slot.place {
+            Place::Force => hung_on(slot.has("x"), slot.mass_measure()),
+            Place::Sensors => seen_together(slot.seen()),
+            _ => seen_alone(slot.inputs()),
+        })
     },
     contains: &[],
     confusable: &["delay", "viscoelastic", "periodic_disturbance"],
@@ -60,18 +30,44 @@ pub static UNMODELLED_MODE: Mechanism = Mechanism {
     reference: "D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000)",
 };
 
-/// A mode of its own beside the plant that each of these sensors sees: how much of it depends on where they stand, which derivative on what they measure.
+/// The law with its frequency and damping. A sharp resonance between two points of the grid shows in neither; a broad one does.
+fn tuned(law: Law) -> Law {
+    law.shape("f_a", "1/t", Grid::Band(25)).shape("zeta_a", "1", Grid::Values(vec![0.02, 0.15])).within(0.001, BROADEST)
+}
+
+/// A mass on a spring that hangs on the moving part: the force that accelerates it is missing there. Where only the velocity of the part is known, the
+/// spring's length stands for the two places.
+fn hung_on(placed: bool, mass: &str) -> Law {
+    let length = if placed { "(x - x_a)" } else { "d_a" };
+    let acceleration = format!("(2*pi*f_a)^2*{length} + 4*pi*f_a*zeta_a*(v - v_a)");
+    let law = Law::force(format!("m_a*({acceleration})")).amplitude("m_a", mass, 0.0, 5.0);
+    if placed {
+        law.state("x_a", "x", "v_a").starting_like("x").state("v_a", "x/t", acceleration).starting_like("v")
+    } else {
+        law.state("d_a", "v*t", "v - v_a").state("v_a", "v", acceleration).starting_like("v")
+    }
+}
+
+/// The states of a mode of its own beside the plant, at rest where this drives it.
+fn beside_the_plant(law: Law, drive: &str, measure: &str) -> Law {
+    let acceleration = format!("(2*pi*f_a)^2*({drive} - q_a) - 4*pi*f_a*zeta_a*p_a");
+    law.state("q_a", measure, "p_a").state("p_a", format!("{measure}/t"), acceleration)
+}
+
+/// A mode of its own that one sensor sees, whatever drives it.
+fn seen_alone(inputs: usize) -> Law {
+    let drive: Vec<String> = (1..=inputs).map(|i| format!("b_{i}*u_{i}")).collect();
+    let law = beside_the_plant(Law::replace("y + q_a"), &drive.join(" + "), "y");
+    (1..=inputs).fold(law, |law, i| law.amplitude(format!("b_{i}"), format!("y/u_{i}"), -3.0, 3.0))
+}
+
+/// A mode of its own that each of these sensors sees: how much of it depends on where they stand, which derivative on what they measure.
 fn seen_together(seen: &[Seen]) -> Law {
-    let omega = "(2*pi*f_a)";
     let texts = (1..).zip(seen).map(|(i, seen)| match seen.rate {
         Rate::Displacement => format!("b_{i}*q_a"),
-        Rate::Velocity => format!("b_{i}*p_a/{omega}"),
-        Rate::Acceleration => format!("b_{i}*(u - q_a - 2*zeta_a*p_a/{omega})"),
+        Rate::Velocity => format!("b_{i}*p_a/(2*pi*f_a)"),
+        Rate::Acceleration => format!("b_{i}*(u - q_a - 2*zeta_a*p_a/(2*pi*f_a))"),
     });
-    let law = Law::outputs(texts.collect()).state("q_a", "u", "p_a").state(
-        "p_a",
-        "u/t",
-        format!("{omega}^2*(u - q_a) - 2*zeta_a*{omega}*p_a"),
-    );
+    let law = beside_the_plant(Law::outputs(texts.collect()), "u", "u");
     (1..=seen.len()).fold(law, |law, i| law.amplitude(format!("b_{i}"), format!("y_{i}/u"), -3.0, 3.0))
 }
