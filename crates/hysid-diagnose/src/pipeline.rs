@@ -25,6 +25,7 @@ use crate::openset::shapes::told_limit;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
 use crate::search::profile::{centre_moments, take_intervals};
+use crate::search::rounding::Converter;
 use crate::slot::{with_balances, with_turns, with_used_turns};
 use crate::text::number;
 use crate::verdict::judgement::Judgement;
@@ -96,7 +97,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let (search, pool) = (&found.search, &found.pool);
     let (setting, best) = (&search.setting, &pool[judged.winner]);
     let wanders = judged.wanders().map(str::to_owned);
-    let Judgement { rest, uneven, wandering, lacking, cut_short, runs_away, .. } = judged;
+    let Judgement { rest, uneven, wandering, converters, lacking, cut_short, runs_away, .. } = judged;
     let spectrum = rest
         .spectrum
         .then_some("a memory with many time scales, a fractional element or a spectrum of relaxation times");
@@ -117,6 +118,15 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         .collect();
     file.notes.extend(unequal.iter().map(|words| format!("{words}: the catalogue has no such law")));
     file.notes.extend(best.effects.iter().zip(&wandering).filter_map(|(e, w)| w.as_ref()?.in_place_of(e)));
+
+    if !converters.is_empty() && converters.len() < file.effects.len() {
+        // From the last: the places before it stay.
+        for converter in converters.iter().rev() {
+            let EffectRecord { mechanism, slot, .. } = file.effects.remove(converter.member);
+            file.alternatives.retain(|a| a.mechanism != mechanism || a.slot != slot);
+        }
+        file.notes.push(Converter::note(&converters));
+    }
 
     (hooks.progress)("scoring on the hold-out");
     let baseline = with_used_turns(&pool[0].base.document(), user);

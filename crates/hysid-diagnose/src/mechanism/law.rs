@@ -119,6 +119,8 @@ pub enum Amplitudes {
     OfTwoSides,
     /// Laws of one name, each a form of its own with this amplitude: the columns are screened one by one.
     Apart,
+    /// The share of a law that is there or not: less than the whole of it is what something blurs.
+    Share,
 }
 
 /// A law at one slot: see the module.

@@ -149,7 +149,8 @@ impl Mechanism {
     }
 
     /// What it is fitted as at first, where these are the amplitudes of its screening form that explain a residual best: a law of two sides of which one
-    /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below), but for one that the signal never reached; of laws that are screened one by one the form with this amplitude.
+    /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below), but for one that the signal never reached; of laws that are screened one by one the form with this amplitude;
+    /// a law that is there or not, and of which less than the whole is there, as [`Form::Soft`].
     pub(crate) fn fitted_first(&self, slot: &Slot, amplitudes: &[(String, f64)]) -> Purpose {
         match (self.law_at(slot, Purpose::Screening).amplitudes, amplitudes) {
             (Amplitudes::Apart, [(name, _)]) => {
@@ -157,6 +158,7 @@ impl Mechanism {
                 let has_it = |law: &Law| law.parameters.iter().filter(amplitude).map(|p| &p.name).eq([name]);
                 self.forms(slot).into_iter().find(|(_, law)| has_it(law)).map_or(Purpose::Refit, |(form, _)| form)
             }
+            (Amplitudes::Share, [(_, share)]) if *share < WHOLE => Purpose::Form(Form::Soft),
             (Amplitudes::OfTwoSides, [(_, above), (_, below)]) => {
                 let idle = |this: &f64, other: &f64| *this != 0.0 && this.abs() < IDLE * other.abs();
                 if idle(below, above) {
@@ -193,6 +195,9 @@ impl Mechanism {
         })
     }
 }
+
+/// Share of a law that is there or not from which it passes for the whole: what noise of a twentieth of a step before a converter leaves of its stair.
+const WHOLE: f64 = 0.75;
 
 /// Share of what a law does on one side below which it does nothing on the other.
 const IDLE: f64 = 0.3;

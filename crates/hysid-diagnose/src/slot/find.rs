@@ -92,12 +92,15 @@ impl Finder<'_> {
     /// Whether the outputs are forces over the motion that the inputs prescribe.
     pub(super) fn is_force_law(&self) -> bool {
         let prescribed = self.simulation.inputs.iter().any(|i| self.kinematic_input(&i.symbol) != Kinematic::Neither);
-        let moves = |column: &str, e: &Expr| {
-            self.unit_of_output(column, e).is_some_and(|u| kinematic(Some(&u), "") != Kinematic::Neither)
+        // A motion, and what flows or is warm (behind a pump, of which the speed is prescribed), is no force.
+        let is_none = |column: &str, e: &Expr| {
+            self.unit_of_output(column, e).is_some_and(|u| {
+                kinematic(Some(&u), "") != Kinematic::Neither || is_one_of(&u, &["m3", "m3/s", "kg/s", "K"])
+            })
         };
         self.motions.is_empty()
             && prescribed
-            && !self.simulation.outputs.iter().any(|o| moves(&o.column, &o.expression))
+            && !self.simulation.outputs.iter().any(|o| is_none(&o.column, &o.expression))
     }
 
     /// The derivatives of these states.

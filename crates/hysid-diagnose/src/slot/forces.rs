@@ -2,8 +2,9 @@
 
 use hysid_plant::{Expr, Output, State};
 
-use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, quotient, size};
+use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, product, quotient, size};
 use super::balance::is_scaled;
+use super::connections::forces_of;
 use super::find::{Finder, has_unit, presses};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
 use super::{Place, Pull, Slot, Target};
@@ -60,6 +61,28 @@ impl Finder<'_> {
         slot.constant = has_free_constant(simulation, force);
     }
 
+    /// The force that other parts put on one: the terms that hold their motion, or what is wound up between them and it.
+    fn transmitted(&self, motion: &Motion<'_>) -> Option<Expr> {
+        let simulation = self.simulation;
+        let others = || self.motions.iter().filter(|m| m.v != motion.v);
+        let wound = |state: &&State| {
+            let rate = &state.derivative;
+            !self.moves(&state.name) && rate.uses(motion.v) && others().any(|m| rate.uses(m.v))
+        };
+        let wound: Vec<&State> = simulation.states.iter().filter(wound).collect();
+        let passed = |term: &Expr| {
+            others().any(|m| term.uses(m.v) || m.x.is_some_and(|x| term.uses(x)))
+                || wound.iter().any(|s| term.uses(&s.name))
+        };
+        let terms = forces_of(simulation, motion).filter(|(_, term)| passed(term));
+        let sum = terms.map(|(sign, term)| product(vec![Expr::Number(sign), term.clone()])).reduce(|a, b| a + b)?;
+        let load = match force_path(simulation, motion.derivative) {
+            ForcePath::Divided(mass) => mass.clone() * sum,
+            ForcePath::Quotient(..) | ForcePath::Bare => sum,
+        };
+        Some(load.simplified())
+    }
+
     /// The inputs that press, by their unit or for all that is known, and that the simulation as the user wrote it makes no use of, as they are offered.
     pub(super) fn idle_loads(&self) -> Vec<String> {
         let idle = |symbol: &str| {
@@ -90,6 +113,9 @@ impl Finder<'_> {
             slot.offer(self.simulation, "rad", rad.unwrap_or(Expr::Number(1.0)));
         }
         self.offer_force(&mut slot, motion.derivative, motion.x, motion.v, motion.scale.as_ref());
+        if let Some(load) = self.transmitted(motion) {
+            slot.offer(self.simulation, "load", load);
+        }
         slot.context = vec![motion.derivative.clone()];
         slot.offer_own_sign(self.simulation);
         slot
@@ -234,6 +260,20 @@ mod tests {
         let found = slots(Place::Force, &chain);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0][..2], ["y", "w1"]);
+    }
+
+    #[test]
+    fn what_flows_behind_a_pump_is_no_force() {
+        let places = |column: &str, unit: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.05\n[inputs]\nn = \"speed_rpm\"\n[parameters]\na = {{ value = 1.5, min = 0.1 }}\n[states]\n\
+                 q = {{ derivative = \"(n/1000)^2 - a*q*abs(q)\", initial = 0.0, unit = \"{unit}\" }}\n[outputs]\n{column} = \"q\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "line.sim.toml").unwrap()).slots;
+            [Place::Input, Place::ForceLaw].map(|place| slots.iter().any(|s| s.place == place))
+        };
+        assert_eq!(places("flow_l_min", "l/min"), [true, false]);
+        assert_eq!(places("torque_Nm", "N m"), [false, true]);
     }
 
     /// The slots of a core's current, measured in this column as this, and its simulation.

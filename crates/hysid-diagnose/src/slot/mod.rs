@@ -237,12 +237,13 @@ impl Slot {
         (1..=self.inputs).map(|i| format!("u_{i}")).filter(enters).collect()
     }
 
-    /// The recorded inputs that may load a guide here, as they are offered: first those that the simulation makes no use of (somebody recorded a clamping
-    /// force), then those that enter the equations here. In a static force law the motion enters too, which loads nothing.
+    /// What may load a guide or a gear here, as it is offered: first recorded inputs that the simulation makes no use of (somebody recorded a clamping
+    /// force), then those that enter the equations here, then what other parts pass on. In a static force law the motion enters too, which loads nothing.
     pub(crate) fn loads(&self) -> Vec<String> {
         let pressing = |u: &String| self.quantity(u).and_then(|q| q.unit.as_ref()).is_some_and(presses);
         let mut others = self.entering();
         others.retain(|u| !self.idle_loads.contains(u) && (self.place != Place::ForceLaw || pressing(u)));
+        others.extend(self.has("load").then(|| "load".to_owned()));
         [&self.idle_loads[..], &others].concat()
     }
 

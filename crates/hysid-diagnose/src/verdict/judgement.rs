@@ -11,6 +11,7 @@ use crate::file::{RemainingRecord, VerdictKind};
 use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::explore::Explored;
+use crate::search::rounding::Converter;
 use crate::search::screen::Candidate;
 
 /// What is believed.
@@ -33,6 +34,8 @@ pub struct Judgement<'d> {
     pub uneven: Vec<Option<Uneven>>,
     /// Whether a parameter wanders in the place of a member of the winner.
     pub wandering: Vec<Option<Wanders>>,
+    /// The members of the set told that are the recording's own, and not told as effects.
+    pub converters: Vec<Converter>,
     /// What the recording lacks for a firm answer about a member of the winner.
     pub lacking: Vec<Option<String>>,
     /// What speaks against writing the winner into the simulation, in words.
@@ -95,12 +98,19 @@ impl<'d> Judgement<'d> {
         }
         // Where one of several effects that only the second look sees is not known, the others may be parts of the same imitation (development seed
         // 341, 0035: a change, firm, beside a spring; dry friction that depends on the position).
-        if !shown && support.len() > 1 && verdict(&support) == VerdictKind::Ambiguous {
+        let converters = search.converters(best);
+        // What the verdict is about: but for the rounding of the recording itself.
+        let verdict_of = |support: &[Support]| {
+            let rounds = |i: &usize| converters.iter().any(|c| c.member == *i);
+            let own: Vec<Support> = (0..support.len()).filter(|i| !rounds(i)).map(|i| support[i].clone()).collect();
+            verdict(if own.is_empty() { support } else { &own })
+        };
+        if !shown && support.len() > 1 && verdict_of(&support) == VerdictKind::Ambiguous {
             support.iter_mut().for_each(Support::weaken);
         }
         // A mismatch that is significant stays one, though nothing that was fitted in time explains it.
         let cut_short = significant && winner == 0 && unfinished();
-        let mut within = if cut_short { VerdictKind::Ambiguous } else { verdict(&support) };
+        let mut within = if cut_short { VerdictKind::Ambiguous } else { verdict_of(&support) };
         let remaining = rest.record(pool, winner);
         let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
             || wandering.iter().flatten().any(|w| w.is_sure(search.options.alpha));
@@ -126,6 +136,7 @@ impl<'d> Judgement<'d> {
                 support = firmness(pool, &weighed, &probability, likeliest, true);
             }
         }
+        let converters = if told == winner { converters } else { Vec::new() };
         Self {
             weighed,
             probability,
@@ -137,6 +148,7 @@ impl<'d> Judgement<'d> {
             support,
             uneven,
             wandering,
+            converters,
             lacking,
             veto,
             cut_short,

@@ -31,16 +31,25 @@ pub static LOAD_DEPENDENT_FRICTION: Mechanism = Mechanism {
     reference: "P. Hamon, M. Gautier, P. Garrec, Dynamic identification of robots with a dry friction model depending on load and velocity, IROS (2010) 6187-6193",
 };
 
-/// The recorded input that loads the guide, with the name of its coefficient. Where there are two (a motor's torque and the load at the tool, or a clamping
-/// force that the simulation makes no use of) no equation tells which of them presses: both are looked for, and each is fitted by itself.
+/// What loads the guide, with the name of its coefficient. Where there are several (a motor's torque and the load at the tool, a clamping force that the
+/// simulation makes no use of, the torque that a gear passes on) no equation tells which of them presses: up to three are looked for, and each is fitted by
+/// itself.
 fn loads(slot: &Slot, purpose: Purpose) -> Vec<(&'static str, String)> {
-    match (&slot.loads()[..], purpose) {
-        ([one, other, ..], Purpose::Screening) => vec![("mu", one.clone()), ("mu_2", other.clone())],
-        ([_, other, ..], Purpose::Form(Form::Other)) => vec![("mu", other.clone())],
-        ([one, ..], _) => vec![("mu", one.clone())],
-        ([], _) => vec![("mu", "u".to_owned())],
+    let mut all = slot.loads();
+    if all.is_empty() {
+        all.push("u".to_owned());
     }
+    let fitted = match purpose {
+        Purpose::Screening => return NAMES.into_iter().zip(all).collect(),
+        Purpose::Form(Form::Other) => all.get(1),
+        Purpose::Form(Form::Few) => all.get(2),
+        Purpose::Refit | Purpose::Form(_) => None,
+    };
+    fitted.or(all.first()).map(|load| (NAMES[0], load.clone())).into_iter().collect()
 }
+
+/// The coefficients of what may load it.
+const NAMES: [&str; 3] = ["mu", "mu_2", "mu_3"];
 
 #[cfg(test)]
 mod tests {
@@ -74,6 +83,25 @@ mod tests {
             Simulation::parse(&text.replace("F/m", "(F - 0.1*abs(F_n)*sign(v))/m"), "slide.sim.toml").unwrap();
         let structure = Structure::within(&with_it, &original);
         assert_eq!(structure.slots.iter().find(|s| s.place == Place::Force).unwrap().loads(), ["u_3", "u_2"]);
+    }
+
+    #[test]
+    fn what_a_gear_passes_on_may_be_the_load() {
+        let of = |motor: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"torque_Nm\"\n[parameters]\nJ = {{ value = 2.0, min = 0.1 }}\nk = {{ value = 50.0, min = 1.0 }}\n\
+                 [states]\nq = {{ derivative = \"w\", initial = 0.0 }}\nw = {{ derivative = \"{motor}\", initial = 0.0 }}\n\
+                 p = {{ derivative = \"r\", initial = 0.0 }}\nr = {{ derivative = \"(k*(q - p) - 0.1*r)/J\", initial = 0.0 }}\n[outputs]\nq_rad = \"q\"\n"
+            );
+            let structure = Structure::of(&Simulation::parse(&text, "joint.sim.toml").unwrap());
+            let slot = structure.slots.into_iter().find(|s| s.place == Place::Force).unwrap();
+            let load = slot.quantity("load").map(|q| q.expression.to_string());
+            (load, loads(&slot, Purpose::Form(Form::Other)).remove(0).1)
+        };
+        let shaft = Some("-(k*(q - p))".to_owned());
+        assert_eq!(of("(u - 0.1*w - k*(q - p))/J"), (shaft, "load".to_owned()));
+        assert_eq!(of("u/J - 0.1/J*w - k*(q - p)/J").1, "load");
+        assert_eq!(of("(u - 0.1*w - k*q)/J"), (None, "u_1".to_owned()));
     }
 
     #[test]
