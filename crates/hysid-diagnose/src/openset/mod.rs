@@ -310,6 +310,16 @@ mod tests {
         let first = &found.record.terms[0];
         assert_eq!((found.record.slot.as_str(), first.term.as_str()), ("state:sd", "w"), "{:?}", found.record.terms);
         assert!((first.coefficient / 0.4 - 1.0).abs() < 0.05 && found.gain > 50.0, "{first:?} {}", found.gain);
+        // As on a linkage: a lever that depends on where the other part stands.
+        let found = missing(" + 20.0*th*w^2").unwrap();
+        let first = &found.record.terms[0];
+        assert_eq!(
+            (found.record.slot.as_str(), first.term.as_str()),
+            ("state:sd", "th*w^2"),
+            "{:?}",
+            found.record.terms
+        );
+        assert!((first.coefficient / 20.0 - 1.0).abs() < 0.1 && found.gain > 50.0, "{first:?} {}", found.gain);
         let nothing = missing("");
         assert!(nothing.is_none_or(|o| o.by_chance(ODDS_AGAINST) > 0.1));
     }

@@ -267,6 +267,28 @@ pub fn product((a, x): (&str, &[Vec<f64>]), (b, y): (&str, &[Vec<f64>])) -> Shap
     Shape::new(text, Kind::Even, both(x, y, |x, y| x * y))
 }
 
+/// A signal with its name.
+type Named<'s> = (&'s str, &'s [Vec<f64>]);
+
+/// What a linkage puts on a part that stands at `x` (where it has a coordinate) and moves with `v`, of another that stands and moves so: centrifugal and
+/// Coriolis forces to first order of the coordinates (products of these and two velocities), and inertia that grows with how the other stands.
+pub fn linked(
+    (x, v): (Option<Named<'_>>, Named<'_>),
+    (place, rate): (Named<'_>, Named<'_>),
+    acceleration: Named<'_>,
+) -> Vec<Shape> {
+    let cubic = |lever: Named<'_>, one: Named<'_>, other: Named<'_>| {
+        let Shape { text, series, .. } = product(one, other);
+        Shape::new(format!("{}*{text}", lever.0), Kind::Odd, both(lever.1, &series, |a, b| a * b))
+    };
+    let levers = x.into_iter().chain([place]);
+    let mut out: Vec<Shape> = levers.flat_map(|lever| [cubic(lever, v, rate), cubic(lever, rate, rate)]).collect();
+    out.push(cubic(place, v, v));
+    let Shape { text, series, .. } = product(place, place);
+    out.push(Shape::new(format!("{text}*{}", acceleration.0), Kind::Odd, both(&series, acceleration.1, |a, b| a * b)));
+    out
+}
+
 /// A factor of a product: how it is written, whether it is odd, and its values.
 type Factor<'f> = (String, bool, Box<dyn Fn(f64) -> f64 + 'f>);
 

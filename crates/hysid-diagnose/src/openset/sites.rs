@@ -1,5 +1,7 @@
 //! Where generic terms act, and over what.
 
+use std::ops::Range;
+
 use hysid_plant::{Expr, Simulation, Slot as Place};
 
 use crate::slot::{Structure, is_turn};
@@ -40,12 +42,27 @@ pub struct Site {
     pub rate: Option<Symbol>,
     /// What moves elsewhere.
     pub others: Vec<Symbol>,
+    /// The coordinates among them that have their velocity there too: the places of both.
+    pub parts: Vec<(usize, usize)>,
+    /// The acceleration here, where there are such parts: on linkages the inertia depends on how the others stand.
+    pub acceleration: Option<Symbol>,
 }
 
 impl Site {
+    /// A site at which nothing else is looked at than what is there.
+    fn alone(place: Place, slot: String, side: &'static str, own: Vec<Symbol>) -> Self {
+        Self { place, slot, side, own, rate: None, others: Vec::new(), parts: Vec::new(), acceleration: None }
+    }
+
     /// All that terms are written over, in this order.
     pub fn symbols(&self) -> impl Iterator<Item = &Symbol> {
-        self.own.iter().chain(&self.rate).chain(&self.others)
+        self.own.iter().chain(&self.rate).chain(&self.others).chain(&self.acceleration)
+    }
+
+    /// What [`Self::others`] are among [`Self::symbols`].
+    pub fn elsewhere(&self) -> Range<usize> {
+        let start = self.own.len() + usize::from(self.rate.is_some());
+        start..start + self.others.len()
     }
 }
 
@@ -58,13 +75,8 @@ pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
     let used = |i: &usize| !is_turn(simulation, &simulation.states[*i].name);
     let states = (0..simulation.states.len()).filter(used).map(|i| of_state(simulation, structure, i));
     let has_slot = |label: &String| structure.slots.iter().any(|s| s.label == *label);
-    let inputs = simulation.inputs.iter().enumerate().filter(|_| !simulation.is_static()).map(|(i, input)| Site {
-        place: Place::Input(i),
-        slot: format!("input:{}", input.symbol),
-        side: "input",
-        own: vec![Symbol::itself(&input.symbol)],
-        rate: None,
-        others: Vec::new(),
+    let inputs = simulation.inputs.iter().enumerate().filter(|_| !simulation.is_static()).map(|(i, input)| {
+        Site::alone(Place::Input(i), format!("input:{}", input.symbol), "input", vec![Symbol::itself(&input.symbol)])
     });
     let outputs = simulation.outputs.iter().enumerate().map(|(i, output)| {
         let signal = |name: &String| Symbol { velocity: name.starts_with('v'), ..Symbol::itself(name) };
@@ -73,14 +85,7 @@ pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
         } else {
             ("output", vec![Symbol::new("y", output.expression.clone())])
         };
-        Site {
-            place: Place::Output(i),
-            slot: format!("output:{}", output.column),
-            side,
-            own,
-            rate: None,
-            others: Vec::new(),
-        }
+        Site::alone(Place::Output(i), format!("output:{}", output.column), side, own)
     });
     states.chain(inputs.filter(|site| has_slot(&site.slot))).chain(outputs).collect()
 }
@@ -102,7 +107,15 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
     let own = own.unwrap_or_default();
     let moves_by_itself = own.iter().all(|s| s.name == state.name) && !matches!(state.derivative, Expr::Symbol(_));
     let rate = moves_by_itself.then(|| Symbol::new(&format!("rate_{}", state.name), state.derivative.clone()));
-    Site { place: Place::State(i), slot: label, side: "plant", own, rate, others }
+    let place = |name: &str| others.iter().position(|o| o.name == name);
+    let velocity = |coordinate: &Symbol| match &simulation.state(&coordinate.name)?.derivative {
+        Expr::Symbol(v) => place(v),
+        _ => None,
+    };
+    let parts: Vec<(usize, usize)> = (0..others.len()).filter_map(|x| Some((x, velocity(&others[x])?))).collect();
+    let moves = own.iter().any(|s| s.velocity) && !parts.is_empty();
+    let acceleration = moves.then(|| Symbol::new(&format!("acc_{}", state.name), state.derivative.clone()));
+    Site { rate, others, parts, acceleration, ..Site::alone(Place::State(i), label, "plant", own) }
 }
 
 /// The states that none of a slot's own coordinates is made of: what moves elsewhere acts through products (a swing's centrifugal force, a field's

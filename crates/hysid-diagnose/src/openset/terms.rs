@@ -73,7 +73,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
     let mut work: Vec<Signal> = Vec::new();
     for site in sites(simulation, &structure) {
         let symbols: Vec<&Symbol> = site.symbols().collect();
-        let (own, others) = (site.own.len(), symbols.len() - site.others.len());
+        let (own, others) = (site.own.len(), site.elsewhere());
         let Site { place, slot: label, side, .. } = &site;
         let mut expressions: Vec<Expr> = symbols.iter().map(|s| s.meaning.clone()).collect();
         let plant = *side == "plant";
@@ -92,12 +92,19 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let within: Arc<[Coordinate]> = own_and_others.chain(driving).collect();
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (symbols[i].name.as_str(), series[i].as_slice());
-        found.extend((own..others).flat_map(|rate| shapes::limits(named(rate))));
-        for other in others..symbols.len() {
+        found.extend((own..others.start).flat_map(|rate| shapes::limits(named(rate))));
+        for other in others.clone() {
             found.push(shapes::proportional(named(other)));
-            let factors = (0..own).chain(others..=other);
+            let factors = (0..own).chain(others.start..=other);
             found.extend(factors.map(|i| shapes::product(named(i), named(other))));
             found.extend(inputs.iter().map(|(u, input)| shapes::product((u, input), named(other))));
+        }
+        if let (Some(v), Some(_)) = (site.own.iter().position(|s| s.velocity), &site.acceleration) {
+            let x = (0..own).find(|i| *i != v).map(named);
+            for (place, rate) in &site.parts {
+                let other = (named(others.start + place), named(others.start + rate));
+                found.extend(shapes::linked((x, named(v)), other, named(others.end)));
+            }
         }
         for (Symbol { name, velocity, .. }, x) in site.own.iter().zip(&series) {
             found.extend(shapes::curves(name, x, *velocity));
