@@ -178,7 +178,7 @@ fn recording(page: &mut Page, s: &FitSummary, series: &Series) {
 /// A movement that counts as a change of direction: a hundredth of the range.
 fn threshold(u: &[f64]) -> f64 {
     let finite = u.iter().copied().filter(|v| v.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    let (low, high) = hysid_signal::range(finite);
     if high > low { 0.01 * (high - low) } else { 0.0 }
 }
 

@@ -7,6 +7,7 @@
 mod autoregression;
 mod excitation;
 mod noise;
+mod range;
 mod recording;
 mod spectrum;
 pub mod tell;
@@ -15,6 +16,7 @@ mod turning_points;
 pub use autoregression::Autoregression;
 pub use excitation::{Excitation, ExcitationError, modulate};
 pub use noise::{NoiseError, autoregressive_noise, variance_for_snr, white_noise};
+pub use range::range;
 pub use recording::{Channel, Clock, Recording, RecordingError, Segment};
 pub use spectrum::{
     CrossSpectrum, SpectrumError, correlation, cross_spectrum, fourier, inverse_fourier, power_spectrum,

@@ -5,6 +5,7 @@
 //! anything that may jump (an input, the sign of a velocity) is left as it is.
 
 use hysid_plant::{Expr, Simulation};
+use hysid_signal::range;
 
 use super::DataSet;
 use crate::evidence::Series;
@@ -105,7 +106,7 @@ fn glitches(e: &[f64], y: &[f64]) -> Vec<(usize, f64)> {
     let level = y.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
     let least = (BEYOND * scale).max(if level.is_finite() { LEVELS * level } else { 0.0 });
     // A sensor at its limit holds back the outermost readings, and the course may be out there for one sample only.
-    let (lowest, highest) = y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
+    let (lowest, highest) = range(y.iter().copied());
     let held_back = |n: usize| {
         let off = deviation(n);
         (off < 0.0 && y[n] > highest - least) || (off > 0.0 && y[n] < lowest + least)

@@ -11,6 +11,7 @@
 //! Reference: J. O. Berger, Statistical Decision Theory and Bayesian Analysis, 2nd ed., Springer (1985), ch. 4.
 
 use hysid_plant::{Drive, Initial, Simulation};
+use hysid_signal::range;
 
 use crate::data::DataSet;
 use crate::evidence::norm2;
@@ -192,7 +193,7 @@ fn doubled(u: &[f64]) -> Vec<f64> {
 
 /// A series so many times as far from the middle of its range.
 fn about_the_middle(u: &[f64], times: f64) -> Vec<f64> {
-    let (low, high) = u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (low, high) = range(u.iter().copied());
     let middle = 0.5 * (low + high);
     u.iter().map(|x| middle + times * (x - middle)).collect()
 }

@@ -1,6 +1,6 @@
 //! What a recording must show for a mechanism to be seen, checked on the recording and told in words.
 
-use hysid_signal::turning_points;
+use hysid_signal::{range, turning_points};
 
 use super::signals::{Signals, mean, rms};
 use crate::evidence::quantile;
@@ -104,7 +104,7 @@ impl Need {
             }
             Self::BothSides(symbol) => {
                 let s = series(symbol)?;
-                let (low, high) = s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+                let (low, high) = range(s.iter().copied());
                 let middle = mean(s);
                 let (below, above) = (middle - low, high - middle);
                 (below.min(above) < 0.2 * below.max(above)).then(|| format!("{} goes to one side only", word(symbol)))

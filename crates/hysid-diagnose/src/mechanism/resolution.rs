@@ -10,6 +10,8 @@
 
 use std::f64::consts::TAU;
 
+use hysid_signal::range;
+
 /// Steps that the signal must cover at least: a smooth distribution has a characteristic function of its own below that.
 const FEWEST: f64 = 6.0;
 /// Steps that it may cover at most: finer ones do not matter beside any noise.
@@ -113,7 +115,7 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     /// `None` where there are too few values, or all are one.
     fn new(values: &'a [f64], weights: &'a [f64]) -> Option<Self> {
-        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (low, high) = range(values.iter().copied());
         let (range, norm) = (high - low, weights.iter().map(|w| w * w).sum::<f64>().sqrt());
         let usable = range > 0.0 && range.is_finite() && norm > 0.0 && norm.is_finite();
         (values.len() >= FEWEST_VALUES && usable).then_some(Self { values, weights, lowest: low, range, norm })

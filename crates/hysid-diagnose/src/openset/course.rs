@@ -2,6 +2,8 @@
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
+use hysid_signal::range;
+
 use super::followed::Followed;
 use crate::model::base::Base;
 
@@ -53,7 +55,7 @@ impl Time {
     pub fn of(base: &Base<'_>) -> Option<Self> {
         let stretches = &base.model.data().stretches;
         let at: Series = stretches.iter().map(|s| s.times().collect()).collect();
-        let range = at.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+        let range = range(at.iter().flatten().copied());
         (range.1 > range.0).then_some(Self { start: range.0, length: range.1 - range.0, at })
     }
 

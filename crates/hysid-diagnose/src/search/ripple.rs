@@ -10,6 +10,7 @@
 //! Reference: K. R. Fyfe, E. D. S. Munck, Analysis of computed order tracking, Mech. Syst. Signal Process. 11 (1997) 187-205.
 
 use hysid_plant::{Expr, Input};
+use hysid_signal::range;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::evidence::{lines, quantile};
@@ -108,7 +109,7 @@ struct Ruler {
 impl Ruler {
     fn of(x: &[Vec<f64>]) -> Option<Self> {
         let all = || x.iter().flatten().copied();
-        let (from, to) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let (from, to) = range(all());
         let travel = to - from;
         if !(travel > 0.0 && travel.is_finite()) {
             return None;

@@ -6,6 +6,8 @@
 //!
 //! Reference: B. Widrow, I. Kollár, Quantization Noise, Cambridge University Press (2008), ch. 1.
 
+use hysid_signal::range;
+
 use super::Search;
 use super::compose::best_of;
 use crate::mechanism::number_with_unit;
@@ -56,7 +58,7 @@ impl Search<'_, '_> {
                 let all = self.setting.data.stretches.iter().flat_map(|s| s.outputs[place].iter().copied());
                 all.filter(|y| y.is_finite())
             };
-            let (low, high) = recorded().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
+            let (low, high) = range(recorded());
             let off = |y: f64| ((y - low) / q - ((y - low) / q).round()).abs();
             let own = high - low >= FINE * q && recorded().all(|y| off(y) <= OFF_A_STEP);
             let words = format!("`{}` ({})", outputs[place].column, number_with_unit(q, step.unit.as_ref()));

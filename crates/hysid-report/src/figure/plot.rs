@@ -233,7 +233,7 @@ impl Plot {
 
 /// The range of `values` with a relative margin; a fixed range where there are none or they are all the same.
 fn padded(values: impl Iterator<Item = f64>, margin: f64) -> (f64, f64) {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    let (low, high) = hysid_signal::range(values);
     if low > high {
         return (0.0, 1.0);
     }

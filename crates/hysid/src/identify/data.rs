@@ -68,7 +68,7 @@ pub(crate) fn spread<'a>(all: impl Iterator<Item = &'a f64> + Clone) -> Option<S
     }
     let mean = there.clone().sum::<f64>() / n as f64;
     let variance = there.clone().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n as f64;
-    let (low, high) = there.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (low, high) = hysid_signal::range(there.copied());
     Some(Spread { mean, std: variance.sqrt(), low, high })
 }
 
