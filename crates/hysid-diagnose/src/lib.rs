@@ -45,7 +45,7 @@ mod search;
 mod text;
 
 #[cfg(test)]
-#[path = "../tests/common/oscillator.rs"]
+#[path = "../tests/diagnose/oscillator.rs"]
 mod oscillator;
 
 pub use answer::bootstrap::{Ratio, ratio_of_rms, rms};

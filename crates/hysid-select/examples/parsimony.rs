@@ -3,7 +3,8 @@
 //! The known 11-term system with equation noise, 84 candidates; true terms found, spurious terms, and the free run of the
 //! model on a fresh input without noise, over 20 seeds each.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/select/common/mod.rs"]
+#[allow(dead_code, reason = "the tests use the rest")]
 mod common;
 
 use common::{narx, true_terms};

@@ -1,8 +1,6 @@
 //! Sensitivities against central differences, and the linear model against the equations.
 
-mod common;
-
-use common::equations::{CASES, drive, model, wobble};
+use crate::common::equations::{CASES, drive, model, wobble};
 use hysid_plant::{Direction, Injection, Run, Slot, Start};
 
 #[test]

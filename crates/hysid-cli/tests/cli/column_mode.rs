@@ -1,10 +1,8 @@
 //! Column mode from end to end: the user's simulator is known by the column that it wrote. Truth and simulator are simulated here, the
 //! tool sees their columns only.
 
-mod common;
-
-use common::oscillator::{normal, rms};
-use common::{hysid, with_files};
+use crate::common::oscillator::{normal, rms};
+use crate::common::{hysid, with_files};
 use hysid_plant::{Compiled, Drive, Run, Simulation, Start};
 use serde_json::Value;
 use tempfile::TempDir;

@@ -1,11 +1,9 @@
 //! Bad input to `hysid diagnose`: exit status 2, one line that names what is wrong and where, and nothing written.
 
-mod common;
-
 use std::path::Path;
 
-use common::oscillator::BASELINE;
-use common::{DIAGNOSE, OscillatorFiles, files_of, hysid, with_files};
+use crate::common::oscillator::BASELINE;
+use crate::common::{DIAGNOSE, OscillatorFiles, files_of, hysid, with_files};
 
 /// A case: what is done to the good files in the folder, the command line, and what the message must hold.
 struct Case {

@@ -1,10 +1,8 @@
 //! Exported code gives the model's own free run.
 
-mod common;
-
 use std::process::Command;
 
-use common::coefficients;
+use crate::common::coefficients;
 use hysid_dictionary::{Record, SignalName, Signals};
 use hysid_narx::{Derived, Law, NarxModel, Parts, Past};
 

@@ -1,13 +1,11 @@
 //! What the files of a command must not be to each other, and recordings that an identification could hang on.
 
-mod common;
-
 use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use crate::common::hysid;
 use assert_cmd::Command;
-use common::hysid;
 
 const SIMULATION: &str = r#"
 [time]
@@ -66,7 +64,7 @@ fn no_result_is_written_over_an_input() {
     std::fs::write(dir.join("model.json"), "{}").unwrap();
     std::fs::write(dir.join("fit.json"), recording(400, 0.01, |_, _, y| y)).unwrap();
     std::fs::write(dir.join("augmented.sim.toml"), SIMULATION).unwrap();
-    let before = common::files_of(dir);
+    let before = crate::common::files_of(dir);
     let overwrite = |line: &[&str]| refused(dir, line, &["--out", "would overwrite"]);
     overwrite(&["simulate", "a.sim.toml", "--input", "est.csv", "--out", "sub/../est.csv"]);
     overwrite(&["simulate", "a.sim.toml", "--input", "est.csv", "--out", "a.sim.toml"]);
@@ -75,7 +73,7 @@ fn no_result_is_written_over_an_input() {
     overwrite(&["decimate", "est.csv", "--output", "y_mm", "--out", "est.csv"]);
     overwrite(&["fit", "--recording", "fit.json", "--input", "u_V", "--output", "y_mm", "--out", "."]);
     overwrite(&["diagnose", "augmented.sim.toml", "--recording", "est.csv", "--holdout", "val.csv", "--out", "."]);
-    assert!(before == common::files_of(dir));
+    assert!(before == crate::common::files_of(dir));
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! Estimation against known truth: refinement, growth, extended least squares, resting points.
 
-mod common;
-
-use common::coefficients;
+use crate::common::coefficients;
 use hysid_dictionary::{Record, Signals, Term};
 use hysid_narx::{Evaluate, Fit, NarxModel, Parts, Refine, Trainer, Window};
 

@@ -1,7 +1,5 @@
 //! Calibration recovers what made the data, from wrong starts, under noise, in open and closed loop.
 
-mod common;
-
 use hysid_plant::{Compiled, Data, Drive, Effort, Flag, Run, Settings, Simulation, Start};
 use hysid_signal::{Excitation, white_noise};
 

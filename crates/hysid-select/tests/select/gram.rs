@@ -1,7 +1,5 @@
 //! Selection from a streamed Gram matrix against selection from the samples.
 
-mod common;
-
 use hysid_dictionary::{Design, Dictionary, GramSums, Record, Signal, Signals, Spec};
 use hysid_linalg::{Gram, Matrix};
 use hysid_select::{Criterion, Options, PressForm, Search, SelectError, Selection, select, select_gram};
@@ -30,14 +28,14 @@ fn the_same_terms_and_coefficients_as_from_the_samples() {
     let wide = Spec::narx(Signals::siso(), 5, 1..=5, 3).build().unwrap();
     let low = Spec::narx(Signals::siso(), 3, 0..=3, 2).build().unwrap();
     let signs = Spec::narx(Signals::siso(), 2, 0..=2, 2).hysteresis(Signal::Input(0), [0, 1]).build().unwrap();
-    let (bu, by) = common::boucwen(60_000);
+    let (bu, by) = crate::common::boucwen(60_000);
     let thin = |x: &[f64]| x.iter().step_by(20).copied().collect::<Vec<f64>>();
     let (bu, by) = (thin(&bu), thin(&by));
     let squared = Options { criterion: Criterion::Press(PressForm::Squared), ..Options::default() };
     let options = [greedy(15), beam, pursuit, err, bic, squared, Options::default()];
     for (dictionary, which) in [(&wide, "narx"), (&low, "narx"), (&low, "boucwen"), (&signs, "boucwen")] {
         for seed in 1..3 {
-            let (u, y) = if which == "narx" { common::narx(6000, seed, 0.05) } else { (bu.clone(), by.clone()) };
+            let (u, y) = if which == "narx" { crate::common::narx(6000, seed, 0.05) } else { (bu.clone(), by.clone()) };
             for options in &options {
                 // Where residuals are large where leverages are, the exact PRESS may stop a term earlier.
                 if which == "boucwen" && *options == Options::default() {
@@ -63,13 +61,14 @@ fn the_same_terms_and_coefficients_as_from_the_samples() {
 #[test]
 fn an_exact_model_is_found_and_not_overdone() {
     let dictionary = Spec::narx(Signals::siso(), 3, 1..=3, 3).build().unwrap();
-    let (u, y) = common::narx(10_000, 1, 0.0);
+    let (u, y) = crate::common::narx(10_000, 1, 0.0);
     let found = select_gram(&streamed(&dictionary, &u, &y, 4096), &Options::default()).unwrap();
     let mut terms: Vec<_> = found.terms.iter().map(|&j| dictionary.terms()[j].clone()).collect();
     terms.sort();
-    assert_eq!(terms, common::true_terms());
+    assert_eq!(terms, crate::common::true_terms());
     for (&j, theta) in found.terms.iter().zip(&found.theta) {
-        let truth = common::TRUTH.iter().find(|(_, t)| Signals::siso().parse(t).unwrap() == dictionary.terms()[j]);
+        let truth =
+            crate::common::TRUTH.iter().find(|(_, t)| Signals::siso().parse(t).unwrap() == dictionary.terms()[j]);
         assert!((truth.unwrap().0 - theta).abs() < 1e-9);
     }
 }
@@ -78,7 +77,7 @@ fn an_exact_model_is_found_and_not_overdone() {
 #[test]
 fn where_digits_run_out_it_says_so() {
     let dictionary = Spec::narx(Signals::siso(), 3, 0..=3, 3).build().unwrap();
-    let (u, y) = common::boucwen(10_000);
+    let (u, y) = crate::common::boucwen(10_000);
     let options = Options { search: Search::Greedy, criterion: Criterion::Terms(36), ..Options::default() };
     let (samples, gram) = both(&dictionary, &u, &y, &options);
     let sure = gram.precision.doubtful_from.unwrap();

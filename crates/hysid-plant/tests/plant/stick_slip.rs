@@ -1,8 +1,6 @@
 //! Delays and lags of the command of a drive whose dry friction sticks: against closed forms, finer steps and central differences.
 
-mod common;
-
-use common::equations::model;
+use crate::common::equations::model;
 use hysid_plant::{Compiled, Direction, Drive, Run};
 
 const PERIOD_S: f64 = 0.13;

@@ -1,8 +1,6 @@
 //! Selection against an orthogonalisation in doubled precision, on well and on ill-conditioned data.
 
-mod common;
-
-use common::{By, Way, boucwen, narx};
+use crate::common::{By, Way, boucwen, narx};
 use hysid_dictionary::{Design, Record, Signals, Spec};
 use hysid_linalg::{Columns, Matrix};
 use hysid_select::{Criterion, Options, PressForm, Search, select};

@@ -1,9 +1,7 @@
 //! Damaged simulation files and recordings: `hysid diagnose` ends with a verdict or with one message, never with a panic.
 
-mod common;
-
-use common::oscillator::BASELINE;
-use common::{FILES, OscillatorFiles, hysid};
+use crate::common::oscillator::BASELINE;
+use crate::common::{FILES, OscillatorFiles, hysid};
 use proptest::prelude::*;
 
 /// One damage to a text.

@@ -1,13 +1,11 @@
 //! What is wrong with a simulation file is told with its place and in words; nothing panics.
 
-mod common;
-
 use hysid_plant::Simulation;
 
 /// Replaces `from` in the manual's example by `to`.
 fn edited(from: &str, to: &str) -> String {
-    assert!(common::OSCILLATOR.contains(from), "the example has no `{from}`");
-    common::OSCILLATOR.replacen(from, to, 1)
+    assert!(crate::common::OSCILLATOR.contains(from), "the example has no `{from}`");
+    crate::common::OSCILLATOR.replacen(from, to, 1)
 }
 
 #[test]
@@ -148,7 +146,7 @@ fn long_names_are_cut_and_line_ends_escaped() {
 
 #[test]
 fn initial_values_in_a_ring_are_told_as_such() {
-    let text = common::OSCILLATOR.replacen("initial = 0.0, unit = \"m\" }", "initial = \"v\" }", 1).replacen(
+    let text = crate::common::OSCILLATOR.replacen("initial = 0.0, unit = \"m\" }", "initial = \"v\" }", 1).replacen(
         "initial = 0.0, unit = \"m/s\" }",
         "initial = \"x\" }",
         1,

@@ -1,7 +1,5 @@
 //! What the tests of this crate share.
 
-#![allow(dead_code)] // each test binary uses a part
-
 pub mod equations;
 
 use std::path::PathBuf;

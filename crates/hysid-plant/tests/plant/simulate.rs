@@ -1,8 +1,6 @@
 //! Trajectories against closed forms; the observer and the check of the step.
 
-mod common;
-
-use common::equations::{drive, largest_error, model, simulate, wobble};
+use crate::common::equations::{drive, largest_error, model, simulate, wobble};
 use hysid_plant::{Data, Observer, Run, Start};
 
 #[test]

@@ -1,19 +1,17 @@
 //! Reading and printing simulation files.
 
-mod common;
-
 use hysid_plant::{BinaryOp, Expr, Function, Initial, Memory, Parameter, Simulation, Unit};
 use proptest::prelude::*;
 
 #[test]
 fn the_manuals_example_reads_and_prints() {
-    let simulation = Simulation::parse(common::OSCILLATOR, "oscillator.sim.toml").expect("valid");
-    assert_eq!(simulation.to_toml(), common::OSCILLATOR);
+    let simulation = Simulation::parse(crate::common::OSCILLATOR, "oscillator.sim.toml").expect("valid");
+    assert_eq!(simulation.to_toml(), crate::common::OSCILLATOR);
 }
 
 #[test]
 fn every_shared_simulation_reads_and_survives_printing() {
-    let Some(shared) = common::shared() else { return };
+    let Some(shared) = crate::common::shared() else { return };
     let mut count = 0;
     for entry in std::fs::read_dir(shared.join("simulations")).expect("folder").flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -175,7 +173,7 @@ proptest! {
         factor in -1e6..1e6f64,
         column in "[a-z][ -~]{0,8}",
     ) {
-        let mut simulation = Simulation::parse(common::OSCILLATOR, "o").expect("valid");
+        let mut simulation = Simulation::parse(crate::common::OSCILLATOR, "o").expect("valid");
         simulation.title = title;
         simulation.outputs[0].column = column;
         simulation.outputs[0].expression = Expr::Number(factor) * "x" + Expr::symbol("extra").pow(2.0).play("extra");

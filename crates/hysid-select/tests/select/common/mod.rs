@@ -1,5 +1,4 @@
 //! The known systems that selection is tried on: an 11-term polynomial NARX model and an oversampled Bouc-Wen oscillator.
-#![allow(dead_code)]
 
 use std::ops::Range;
 

@@ -1,12 +1,10 @@
 //! What `hysid diagnose` leaves in its folder: `diagnosis.json` field by field as the contract has it, the same bytes for any number of
 //! threads, an augmented simulation only where there is one, and what a time limit does.
 
-mod common;
-
 use std::path::Path;
 
+use crate::common::{DIAGNOSE, OscillatorFiles, hysid};
 use assert_cmd::Command;
-use common::{DIAGNOSE, OscillatorFiles, hysid};
 use serde_json::Value;
 
 const FAMILIES: [(&str, &[&str]); 26] = [

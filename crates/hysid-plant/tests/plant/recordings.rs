@@ -2,8 +2,6 @@
 //!
 //! With `--nocapture` it prints a table: error of the user's values and of the calibrated ones on the hold-out.
 
-mod common;
-
 use std::path::Path;
 
 use hysid_plant::{ClockSource, Compiled, Data, Run, Settings, Simulation, Start};
@@ -85,7 +83,7 @@ const BASELINES: &[Baseline] = &[
 
 #[test]
 fn the_shared_baselines_calibrate() {
-    let Some(shared) = common::shared() else { return };
+    let Some(shared) = crate::common::shared() else { return };
     println!("{:30} {:>10} {:>10} {:>10} {:>6} {:>5} {:>8}", "", "rms", "user", "calibrated", "sims", "steps", "s");
     for (name, estimation, holdout, split, allowed) in BASELINES {
         let text = std::fs::read_to_string(shared.join(format!("simulations/{name}.sim.toml"))).expect("readable");

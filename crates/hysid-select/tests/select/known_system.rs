@@ -1,8 +1,6 @@
 //! The default finds every term of the known 11-term system and no other, for every seed.
 
-mod common;
-
-use common::{TRUTH, narx, true_terms};
+use crate::common::{TRUTH, narx, true_terms};
 use hysid_dictionary::{Design, Record, Signals, Spec, Term};
 use hysid_select::{Options, Search, Selection, select};
 

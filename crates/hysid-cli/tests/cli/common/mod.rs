@@ -1,15 +1,12 @@
 //! What the tests of `hysid diagnose` share: good files of an oscillator, and the program itself.
 
-// Each test file uses its own part of this.
-#![allow(dead_code)]
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-#[path = "../../../hysid-diagnose/tests/common/oscillator.rs"]
+#[path = "../../../../hysid-diagnose/tests/diagnose/oscillator.rs"]
 pub mod oscillator;
 
 use oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};

@@ -1,16 +1,10 @@
 //! Whole diagnoses of an oscillator whose recordings come from a small integrator of the tests' own, and bad input.
 
-#[path = "diagnose/actuator.rs"]
 mod actuator;
-#[path = "diagnose/held.rs"]
 mod held;
-#[path = "common/oscillator.rs"]
 mod oscillator;
-#[path = "diagnose/rotor.rs"]
 mod rotor;
-#[path = "diagnose/sensed.rs"]
 mod sensed;
-#[path = "diagnose/store.rs"]
 mod store;
 
 use hysid_diagnose::file::VerdictKind;

@@ -1,8 +1,6 @@
 //! The model against hand computation, the dictionary's own evaluator, and its file.
 
-mod common;
-
-use common::coefficients;
+use crate::common::coefficients;
 use hysid_dictionary::{Model, Record, Signal, SignalName, Signals};
 use hysid_narx::{Derived, Law, NarxModel, NoiseTerm, Parts, Past};
 use proptest::prelude::*;

@@ -1,8 +1,6 @@
 //! Many runs at a time, in lanes: each is bit for bit what it is alone.
 
-mod common;
-
-use common::equations::{CASES, drive, model, wobble};
+use crate::common::equations::{CASES, drive, model, wobble};
 use hysid_plant::{Direction, Injection, Run, Slot, Start};
 
 #[test]

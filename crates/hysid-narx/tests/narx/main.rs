@@ -1,0 +1,6 @@
+//! Models: estimated, run freely, written and read.
+
+mod common;
+mod estimation;
+mod export;
+mod model;
