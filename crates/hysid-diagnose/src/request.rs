@@ -48,6 +48,11 @@ pub struct Hooks<'a> {
     pub accepted: &'a (dyn Fn() + Sync),
 }
 
+impl Hooks<'static> {
+    /// Nobody follows, and there is time for everything.
+    pub const SILENT: Self = Self { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
+}
+
 /// A question as it was typed.
 pub fn words(question: &Question) -> String {
     question.iter().map(|(m, s)| format!("{m}@{s}")).collect::<Vec<_>>().join("+")

@@ -321,8 +321,7 @@ mod tests {
         let data = DataSet::new(&original, &[recording], 3).unwrap();
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
-        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
-        let search = Search::new(setting, Options::default(), &hooks);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let found: Vec<&str> = search.absorbed(&none).iter().map(|c| c.mechanism.id).collect();
         let own = search.around(&none).iter().find(|c| found.first() == Some(&c.mechanism.id)).map(Candidate::score);
         (found, own)

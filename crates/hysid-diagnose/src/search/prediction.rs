@@ -143,8 +143,7 @@ mod tests {
         let candidates = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| m.id == id);
         let set = refit(&setting, &none, &candidates[0]).unwrap();
         let gain = set.log_evidence - none.log_evidence;
-        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
-        let search = Search::new(setting, Options::default(), &hooks);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         (search.by_a_force(&none, &[set], candidates.len()), gain)
     }
 

@@ -117,8 +117,7 @@ mod tests {
         let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
-        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
-        let search = Search::new(setting, Options::default(), &hooks);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let asked = |id: &str, slot: &str| search.answer(&none, &vec![(id.to_owned(), slot.to_owned())]);
         let sets = [asked(ROUNDING, "output:x_m"), asked("coulomb_friction", "state:v")];
         search.by_rounding(&none, &Vec::from_iter(sets.into_iter().flatten())).is_some()

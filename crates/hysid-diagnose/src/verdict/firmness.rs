@@ -186,8 +186,7 @@ mod tests {
         let data = recorded(&original, PERIOD, [("u_N", u), (output, y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
-        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
-        let search = Search::new(setting, Options::default(), &hooks);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let sets = std::iter::once("delay").chain(besides.iter().copied());
         let sets: Vec<Hypothesis<'_>> =
             sets.filter_map(|id| search.answer(&none, &vec![(id.to_owned(), "input:u".to_owned())])).collect();

@@ -117,8 +117,7 @@ mod tests {
         let budget = Budget::new(&|_| false);
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
-        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
-        let search = Search::new(setting, Options::default(), &hooks);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let question: Vec<_> = changes.iter().map(|id| ((*id).to_owned(), "parameter:k".to_owned())).collect();
         let changed = search.answer(&none, &question).unwrap();
         assert!(changed.log_evidence > none.log_evidence + SLOW, "{} {}", changed.log_evidence, none.log_evidence);

@@ -282,8 +282,7 @@ mod tests {
         let budget = Budget::new(&|_| false);
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
-        let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
-        let search = Search::new(setting, Options::default(), &hooks);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let Hypothesis { mut base, effects, .. } =
             search.answer(&none, &vec![("abrupt_change".to_owned(), "parameter:k".to_owned())]).unwrap();
         let place = base.model.place_of(&effects[0].written.amplitudes[0].name).unwrap();

@@ -68,7 +68,6 @@ fn diagnosed(plays: Loop<'_>, noise: f64) -> Diagnosis {
 
 fn of_recordings(estimation: Recording, holdout: Recording) -> Diagnosis {
     let simulation = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
-    let hooks = Hooks { progress: &|_| {}, expired: &|_| false, accepted: &|| {} };
     let request = Request {
         simulation: &simulation,
         file: "test.sim.toml",
@@ -77,7 +76,7 @@ fn of_recordings(estimation: Recording, holdout: Recording) -> Diagnosis {
         questions: &[],
         options: Options::default(),
     };
-    diagnose(&request, &hooks).unwrap()
+    diagnose(&request, &Hooks::SILENT).unwrap()
 }
 
 /// What a diagnosis tells of its only effect, after what must hold of all: the family, and what is left on the hold-out over the noise.

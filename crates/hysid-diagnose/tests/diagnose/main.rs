@@ -34,7 +34,7 @@ fn run_until(
     holdout: &[Recording],
 ) -> Result<Diagnosis, DiagnoseError> {
     let simulation = Simulation::parse(text, "test.sim.toml").unwrap();
-    let hooks = Hooks { progress: &|_| {}, expired, accepted: &|| {} };
+    let hooks = Hooks { expired, ..Hooks::SILENT };
     let request = Request {
         simulation: &simulation,
         file: "test.sim.toml",
