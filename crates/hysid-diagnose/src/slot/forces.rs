@@ -114,7 +114,9 @@ impl Finder<'_> {
         }
         self.offer_force(&mut slot, motion.derivative, motion.x, motion.v, motion.scale.as_ref());
         if let Some(load) = self.transmitted(motion) {
+            // It is a term of the sum that the forces are.
             slot.offer(self.simulation, "load", load);
+            slot.measure_alike("load", "F");
         }
         slot.context = vec![motion.derivative.clone()];
         slot.offer_own_sign(self.simulation);

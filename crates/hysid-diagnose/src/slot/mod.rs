@@ -180,6 +180,14 @@ impl Slot {
         self.symbols.insert(symbol.to_owned(), Quantity { expression, unit });
     }
 
+    /// Gives a symbol the unit of another.
+    fn measure_alike(&mut self, symbol: &str, other: &str) {
+        let unit = self.quantity(other).and_then(|q| q.unit.clone());
+        if let Some(quantity) = self.symbols.get_mut(symbol) {
+            quantity.unit = unit;
+        }
+    }
+
     /// Leaves the unit of a symbol open.
     fn forget_unit(&mut self, symbol: &str) {
         if let Some(quantity) = self.symbols.get_mut(symbol) {
