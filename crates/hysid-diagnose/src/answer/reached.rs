@@ -36,7 +36,7 @@ fn signal(h: &Hypothesis<'_>, place: Place, target: &Target) -> Option<Vec<f64>>
     let data = h.base.model.data();
     let simulation = h.base.model.simulation();
     match (place, target) {
-        (Place::Input, Target::Symbol(symbol)) => {
+        (Place::Input | Place::Prescribed, Target::Symbol(symbol)) => {
             let at = simulation.inputs.iter().position(|i| i.symbol == *symbol)?;
             Some(data.stretches.iter().flat_map(|s| s.drive.inputs()[at].iter().copied()).collect())
         }

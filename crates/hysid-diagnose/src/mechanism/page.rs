@@ -49,6 +49,7 @@ fn law_text(law: &Law) -> String {
 fn place_name(place: Place) -> &'static str {
     match place {
         Place::Input => "input",
+        Place::Prescribed => "prescribed motion",
         Place::Between => "inside a cascade",
         Place::Command => "command of a controller",
         Place::Force => "force on a moving part",

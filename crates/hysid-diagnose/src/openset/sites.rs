@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hysid_plant::{Expr, Simulation, Slot as Place};
 
-use crate::slot::{Structure, is_turn};
+use crate::slot::{Place as Slotted, Structure, is_turn};
 
 /// A signal that terms are written over.
 #[derive(Debug, Clone)]
@@ -74,7 +74,7 @@ pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
     // Over an angle that nothing uses there is nothing but what returns with the turn, and the catalogue has that.
     let used = |i: &usize| !is_turn(simulation, &simulation.states[*i].name);
     let states = (0..simulation.states.len()).filter(used).map(|i| of_state(simulation, structure, i));
-    let has_slot = |label: &String| structure.slots.iter().any(|s| s.label == *label);
+    let has_slot = |label: &String| structure.slots.iter().any(|s| s.label == *label && s.place != Slotted::Prescribed);
     let inputs = simulation.inputs.iter().enumerate().filter(|_| !simulation.is_static()).map(|(i, input)| {
         Site::alone(Place::Input(i), format!("input:{}", input.symbol), "input", vec![Symbol::itself(&input.symbol)])
     });

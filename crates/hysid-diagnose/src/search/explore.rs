@@ -13,6 +13,7 @@ use crate::file::DetectableRecord;
 use crate::model::base::{Base, NoiseKind};
 use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::request::{Hooks, Request, words};
+use crate::slot::is_linear;
 
 /// What was found on one calibration.
 pub struct Explored<'a, 'd> {
@@ -144,6 +145,8 @@ pub fn explore<'a, 'd>(
     if !significant {
         pool.clear();
     }
+    // Plain squares take what a random force does for mismatch, also where the simulation is linear.
+    let mut forced = None;
     if significant && let Some((start, found)) = gross.take() {
         plainly.singles(&start, &found, &mut pool);
         if let Some(lesson) = learned(&plainly, &start, &pool, Done::Singles) {
@@ -155,6 +158,8 @@ pub fn explore<'a, 'd>(
         if fine {
             pool = sets;
         } else {
+            forced = search.by_a_force(&none, &sets, found.len());
+            significant = forced.is_none();
             gross = Some((start, found));
         }
     }
@@ -196,8 +201,12 @@ pub fn explore<'a, 'd>(
         Some(lesson) => return again(lesson),
         None => (search, none),
     };
-    let by_chance = if significant { search.by_a_force(&none, &pool, candidates.len()) } else { None };
-    if let Some(p) = by_chance {
+    // A simulation that is linear never parts from its machine: the noise of its free run is that of the force, and what predictions follow better is no
+    // noise of any spectrum, but a change, a shape, a memory.
+    if significant && !is_linear(none.base.model.simulation()) {
+        forced = search.by_a_force(&none, &pool, candidates.len());
+    }
+    if let Some(p) = forced {
         notes.push("predicted from sample to sample, the simulation as it is follows the recording better than any set of effects that was fitted to its free run: random forces that act on the machine explain what is left".into());
         (significant, p_value) = (false, p);
         pool.clear();

@@ -16,7 +16,6 @@ use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::model::{Model, Values};
 use crate::openset::{ODDS_AGAINST, OpenSet};
 use crate::refit::LmOptions;
-use crate::slot::is_linear;
 
 /// How strong the unknown force may be, over the inputs.
 const STRENGTHS: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
@@ -32,13 +31,10 @@ const ITERATIONS: usize = 12;
 impl<'d> Search<'_, 'd> {
     /// The probability, beyond the level, that sets gain by chance what they gain over a simulation on which an unknown force acts; `None` where
     /// there is no such force, or where sets or generic terms tell more than it does.
-    ///
-    /// A simulation that is linear never parts from its machine: the noise of its free run is that of the force, and what predictions follow better
-    /// is no noise of any spectrum, but a change, a shape, a memory.
     pub fn by_a_force(&self, none: &Hypothesis<'d>, pool: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
         let setting = &self.setting;
         let simulation = none.base.model.simulation();
-        if setting.noise != NoiseKind::Coloured || setting.pushed.is_empty() || is_linear(simulation) {
+        if setting.noise != NoiseKind::Coloured || setting.pushed.is_empty() {
             return None;
         }
         let as_it_is = |from: &Base<'d>| predicted(setting, simulation, from);

@@ -130,11 +130,13 @@ impl Finder<'_> {
         for input in &self.simulation.inputs {
             let symbol = &input.symbol;
             let used = self.equations().iter().any(|e| e.uses(symbol));
-            if !used || differentiated(symbol) || (law && self.kinematic_input(symbol) != Kinematic::Neither) {
+            let prescribed = law && self.kinematic_input(symbol) != Kinematic::Neither;
+            // In a static law what the motion does is what the law does.
+            if !used || differentiated(symbol) || (prescribed && self.simulation.is_static()) {
                 continue;
             }
             let mut slot = Slot::new(
-                Place::Input,
+                if prescribed { Place::Prescribed } else { Place::Input },
                 format!("input:{symbol}"),
                 format!("at the input {symbol}"),
                 Target::Symbol(symbol.clone()),

@@ -272,10 +272,10 @@ mod tests {
                  q = {{ derivative = \"(n/1000)^2 - a*q*abs(q)\", initial = 0.0, unit = \"{unit}\" }}\n[outputs]\n{column} = \"q\"\n"
             );
             let slots = Structure::of(&Simulation::parse(&text, "line.sim.toml").unwrap()).slots;
-            [Place::Input, Place::ForceLaw].map(|place| slots.iter().any(|s| s.place == place))
+            [Place::Input, Place::Prescribed, Place::ForceLaw].map(|place| slots.iter().any(|s| s.place == place))
         };
-        assert_eq!(places("flow_l_min", "l/min"), [true, false]);
-        assert_eq!(places("torque_Nm", "N m"), [false, true]);
+        assert_eq!(places("flow_l_min", "l/min"), [true, false, false]);
+        assert_eq!(places("torque_Nm", "N m"), [false, true, true]);
     }
 
     /// The slots of a core's current, measured in this column as this, and its simulation.

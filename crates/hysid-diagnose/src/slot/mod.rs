@@ -74,6 +74,8 @@ pub(crate) const OWN_VELOCITY: &str = "v_own";
 pub enum Place {
     /// Before the plant: the input is replaced wherever it is used.
     Input,
+    /// A motion that an input prescribes to a force law with states, where it goes no further than a limit or begins late.
+    Prescribed,
     /// Inside a cascade: what one part passes on to the next, without anything coming back.
     Between,
     /// What a controller inside the simulation puts out.

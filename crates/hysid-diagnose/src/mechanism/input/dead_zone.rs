@@ -8,7 +8,7 @@ pub static DEAD_ZONE: Mechanism = Mechanism {
     id: "dead_zone",
     family: Family::InputNonlinearity,
     block: Block::Input,
-    places: &[Place::Input, Place::Between, Place::Command],
+    places: &[Place::Input, Place::Prescribed, Place::Between, Place::Command],
     applies: anywhere,
     already: &["max(min(u, P), Q)", "max(u - P, 0)"],
     law: |_, purpose| {

@@ -9,7 +9,7 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
     id: "input_saturation",
     family: Family::InputNonlinearity,
     block: Block::Input,
-    places: &[Place::Input, Place::Between, Place::Command],
+    places: &[Place::Input, Place::Prescribed, Place::Between, Place::Command],
     applies: anywhere,
     already: &["max(min(u, P), Q)", "min(max(u, P), Q)", "min(u, P)", "max(u, P)", "u - P*max(u - Q, 0)"],
     law: |slot, purpose| {
@@ -22,13 +22,14 @@ pub static INPUT_SATURATION: Mechanism = Mechanism {
                 .shape("s", "u", Grid::Quantiles("u", quantiles.to_vec()))
                 .searched();
         }
-        // What gives way by and by, an amplifier or a core (Froelich's curve): the recording need not come near the limit. Of a force that is measured under a
-        // prescribed motion it would imitate whatever softens (a rocking wall, a damper): sensors have no such forms.
+        // What gives way by and by, an amplifier or a core (Froelich's curve): the recording need not come near the limit. Of a prescribed motion, or of the
+        // force that is measured under it, it would imitate whatever softens (a rocking wall, a damper): these and sensors have no such forms.
         let by_and_by = |text: &str| {
             let reach = Grid::Reach("u", vec![0.7, 1.5, 3.0, 6.0]);
             Law::replace(text).shape("s_t", "u", reach).silent().report("s", "u", "s_t")
         };
         match purpose {
+            _ if slot.place == Place::Prescribed => limited("u", &quantiles, purpose),
             Purpose::Form(Form::Soft) => by_and_by("s_t*tanh(u/s_t)"),
             Purpose::Form(Form::Softer) => by_and_by("u/(1 + abs(u)/s_t)"),
             _ => limited("u", &quantiles, purpose),
