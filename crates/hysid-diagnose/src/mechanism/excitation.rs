@@ -154,7 +154,8 @@ impl Need {
             Self::Angle(least) => {
                 // Over an angle that was added there is no `x`: what turns, turns far enough.
                 let x = series("x")?;
-                let radians = signals.constants.get("rad").copied().unwrap_or(1.0);
+                // What does not turn has no angle to swing by.
+                let radians = *signals.constants.get("rad")?;
                 let largest = x.iter().fold(0.0_f64, |m, v| m.max(v.abs())) * radians;
                 (largest < least).then(|| format!("the swing is {largest:.2} rad at most, {least} are needed"))
             }

@@ -1,7 +1,7 @@
 //! The commands of loops that the simulation closes: what a controller in its equations puts out, as `j - kp*x - kd*v` in
 //! `(ks*x + ki*(j - kp*x - kd*v))/m`. What an actuator leaves out acts on the whole of it, the fed-back part too.
 
-use hysid_plant::{BinaryOp, Expr, Simulation};
+use hysid_plant::{BinaryOp, Expr, Simulation, State};
 
 use super::algebra::only_parameters;
 use super::find::Finder;
@@ -14,7 +14,8 @@ impl Finder<'_> {
         let known = self.simulation.states.iter().filter(|s| self.original.state(&s.name).is_some());
         let mut found: Vec<(Expr, Vec<String>)> = Vec::new();
         for state in known {
-            for command in commands_in(self.simulation, &state.derivative) {
+            let all = commands_in(self.simulation, &state.derivative);
+            for command in all.into_iter().chain(followed(self.simulation, state)) {
                 match found.iter_mut().find(|(e, _)| *e == *command) {
                     Some((_, driven)) => driven.push(state.name.clone()),
                     None => found.push((command.clone(), vec![state.name.clone()])),
@@ -61,6 +62,22 @@ fn commands_in<'e>(simulation: &Simulation, derivative: &'e Expr) -> Vec<&'e Exp
         }
     });
     found
+}
+
+/// The command that an actuator follows, where its state is one: `c` in `(c - a)/T` of a state `a`, of an input and fed-back states. What a winding feels of
+/// its motor's speed is no command: its own current stands there with the resistance.
+pub(super) fn followed<'e>(simulation: &Simulation, state: &'e State) -> Option<&'e Expr> {
+    let behind = match &state.derivative {
+        Expr::Binary(BinaryOp::Div, behind, time) if only_parameters(simulation, time) => behind,
+        Expr::Binary(BinaryOp::Mul, a, b) if only_parameters(simulation, a) => b,
+        Expr::Binary(BinaryOp::Mul, a, b) if only_parameters(simulation, b) => a,
+        _ => return None,
+    };
+    let Expr::Binary(BinaryOp::Sub, command, own) = &**behind else { return None };
+    let drives = simulation.inputs.iter().any(|i| command.uses(&i.symbol));
+    let feeds_back = simulation.states.iter().any(|s| command.uses(&s.name));
+    let follows = **own == Expr::symbol(&state.name) && !command.uses(&state.name);
+    (follows && drives && feeds_back && command.terms().len() > 1).then_some(command)
 }
 
 /// Whether this is a factor that an actuator has, and not the inverse of a mass before the forces themselves.
@@ -122,6 +139,28 @@ mod tests {
             assert_eq!(commands("(K*(P*(r - q) - D*w) - b*w)/J", units), ["P*(r - q) - D*w"]);
             assert_eq!(commands("K*(i - P*q - D*w)/J - b*w/J", units), ["i - P*q - D*w"]);
         }
+    }
+
+    #[test]
+    fn an_actuator_follows_a_command_and_moves_the_plant() {
+        let found = |servo: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.1\n[inputs]\nr = \"course_deg\"\n[parameters]\nK = {{ value = 0.1, min = 0.01 }}\nT = {{ value = 3.0, min = 0.1, unit = \"s\" }}\n\
+                 [states]\npsi = {{ derivative = \"w\", initial = 0.0, unit = \"deg\" }}\nw = {{ derivative = \"K*de - 0.1*w\", initial = 0.0, unit = \"deg/s\" }}\n\
+                 de = {{ derivative = \"{servo}\", initial = 0.0, unit = \"deg\" }}\n[outputs]\nheading_deg = \"psi\"\n"
+            );
+            let slots = crate::slot::Structure::of(&Simulation::parse(&text, "ship.sim.toml").unwrap()).slots;
+            let at = |place: Place| {
+                let mut signals = slots.iter().filter(|s| s.place == place).filter_map(|s| s.quantity("u"));
+                signals.next().map(|q| q.expression.to_string())
+            };
+            (at(Place::Command), at(Place::Between))
+        };
+        let whole = |command: &str| (Some(command.to_owned()), Some("de".to_owned()));
+        assert_eq!(found("(0.8*(r - psi) - 14*w - de)/T"), whole("0.8*(r - psi) - 14*w"));
+        assert_eq!(found("0.3*(r - psi - 14*w - de)"), whole("r - psi - 14*w"));
+        // What reacts upon it is no controller.
+        assert_eq!(found("(r - psi - 2*de)/T"), (None, None));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use hysid_plant::{Expr, Memory, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient, quotient};
+use super::commands::followed;
 use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
 use super::{OWN_VELOCITY, Place, Sensed, Slot, Target, sensed};
 
@@ -185,12 +186,14 @@ impl Finder<'_> {
         for source in self.simulation.states.iter().filter(|s| known(&s.name)) {
             let integrates =
                 |name: &str| self.motions.iter().any(|m| m.v == source.name && [m.x, m.turn].contains(&Some(name)));
+            // What comes back through a controller does not act upon its actuator.
+            let alone = followed(self.simulation, source).is_some() && !self.moves(&source.name);
             let driven: Vec<String> = self
                 .simulation
                 .states
                 .iter()
                 .filter(|s| known(&s.name) && s.name != source.name && s.derivative.uses(&source.name))
-                .filter(|s| !integrates(&s.name) && !self.reaches(&s.name, &source.name))
+                .filter(|s| !integrates(&s.name) && (alone || !self.reaches(&s.name, &source.name)))
                 .map(|s| s.name.clone())
                 .collect();
             if !driven.is_empty() {

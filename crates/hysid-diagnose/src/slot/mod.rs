@@ -247,6 +247,11 @@ impl Slot {
         (1..=self.inputs).map(|i| format!("u_{i}")).filter(enters).collect()
     }
 
+    /// Whether an input enters the equations here.
+    pub(crate) fn is_driven(&self) -> bool {
+        !self.entering().is_empty()
+    }
+
     /// What may load a guide or a gear here, as it is offered: first recorded inputs that the simulation makes no use of (somebody recorded a clamping
     /// force), then those that enter the equations here, then what other parts pass on. In a static force law the motion enters too, which loads nothing.
     pub(crate) fn loads(&self) -> Vec<String> {

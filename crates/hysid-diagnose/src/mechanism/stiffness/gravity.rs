@@ -1,19 +1,20 @@
-//! The weight of an arm or a pendulum.
+//! A weight: of an arm or a pendulum, or of what rises and falls.
 
 use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
-/// The weight of an arm or a pendulum.
+/// A weight: of an arm or a pendulum, or of what rises and falls.
 pub static GRAVITY: Mechanism = Mechanism {
     id: "gravity",
     family: Family::Gravity,
     block: Block::Restoring,
     places: &[Place::Force],
-    applies: |slot| slot.angle().is_some(),
+    // Where an input acts on the part, a constant force is an offset of that input.
+    applies: |slot| slot.angle().is_some() || (!slot.has_constant() && !slot.is_driven()),
     already: &["sin(rad*x)", "sin(x)", "sin(P*x)", "sin(x*P)", "sin(x + P)", "sin(x - P)", "cos(x)", "cos(x + P)"],
     law: |slot, purpose| {
         // What turns and is out of balance is pulled as an arm is.
-        let angle = slot.angle().unwrap_or("rad*x");
+        let Some(angle) = slot.angle() else { return Law::force("G").amplitude("G", "F", -2.0, 2.0) };
         // An angle is mostly counted from where the arm hangs or from where it is level.
         let one = |name: &str, wave: &str, phase: &str| {
             Law::force(format!("{name}*{wave}({angle})"))
@@ -48,7 +49,7 @@ pub static GRAVITY: Mechanism = Mechanism {
         "position_dependent_inertia",
     ],
     needs: &[Need::Angle(0.3)],
-    sentence: "A weight pulls {place}: up to {G}, as the sine of the angle plus {phi} rad; the simulation has none.",
+    sentence: "A weight pulls {place}: {G}[ at most, as the sine of the angle plus {phi} rad]; the simulation has none.",
     signature: "For small swings a stiffness and an offset; for large ones softening.",
     reference: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, Wiley (1979), ch. 2",
 };
