@@ -6,7 +6,7 @@ use hysid_plant::{Expr, Output, Simulation};
 
 use super::Change;
 use super::copies::{follow, renewed};
-use crate::slot::{ForcePath, Pull, Slot, Target, force_path, play_of};
+use crate::slot::{Felt, ForcePath, Pull, Slot, Target, force_path, play_of};
 
 /// The law's own names and the names that they have in the simulation.
 pub(super) struct Writer<'a> {
@@ -46,15 +46,14 @@ impl Writer<'_> {
     }
 }
 
-/// The outputs that measure the derivative of a state, each with the multiple.
+/// The outputs that measure the derivative of a state, or what holds it, each with the multiple.
 fn sensors<'s>(
     simulation: &'s mut Simulation,
     slot: &'s Slot,
     state: &'s str,
-) -> impl Iterator<Item = (&'s mut Output, f64)> {
-    let times =
-        move |o: &Output| slot.sensed.iter().find(|s| s.state == state && s.column == o.column).map(|s| s.times);
-    simulation.outputs.iter_mut().filter_map(move |o| times(o).map(|times| (o, times)))
+) -> impl Iterator<Item = (&'s mut Output, Felt, f64)> {
+    let sensed = move |o: &Output| slot.sensed.iter().find(|s| s.state == state && s.column == o.column);
+    simulation.outputs.iter_mut().filter_map(move |o| sensed(o).map(|s| (o, s.felt, s.times)))
 }
 
 /// Gives a state another derivative, and to whatever else holds the old one. The outputs that measure it have been seen to.
@@ -146,8 +145,14 @@ pub(super) fn enter(
                     }
                     ForcePath::Bare => (joined(derivative.clone(), &force), force.clone()),
                 };
-                for (output, times) in sensors(simulation, slot, name) {
-                    output.expression = joined(output.expression.clone(), &(Expr::Number(times) * rate.clone()));
+                for (output, felt, times) in sensors(simulation, slot, name) {
+                    let (part, resists) = match felt {
+                        Felt::Rate => (Expr::Number(times) * rate.clone(), resists),
+                        Felt::Force => {
+                            ((Expr::Number(times.abs()) * force.clone()).simplified(), resists * times.signum())
+                        }
+                    };
+                    output.expression = pull.join(output.expression.clone(), part, resists);
                 }
                 derive(simulation, slot, name, &derivative, written);
             }
@@ -168,7 +173,8 @@ pub(super) fn enter(
                     }
                     ForcePath::Bare => (derivative.clone() - force.clone()) / (Expr::Number(1.0) + more.clone()),
                 };
-                for (output, times) in sensors(simulation, slot, name) {
+                // A cell that feels what holds the part feels nothing of its inertia.
+                for (output, _, times) in sensors(simulation, slot, name).filter(|(_, felt, _)| *felt == Felt::Rate) {
                     let change = Expr::Number(times) * (written.clone() - derivative.clone());
                     output.expression = output.expression.clone() + change;
                 }

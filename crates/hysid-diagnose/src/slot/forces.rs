@@ -62,7 +62,12 @@ impl Finder<'_> {
     }
 
     /// The force that other parts put on one: the terms that hold their motion, or what is wound up between them and it.
-    fn transmitted(&self, motion: &Motion<'_>) -> Option<Expr> {
+    pub(super) fn transmitted(&self, motion: &Motion<'_>) -> Option<Expr> {
+        self.forces_on(motion, true)
+    }
+
+    /// The force on a part that does, or does not, come from others.
+    pub(super) fn forces_on(&self, motion: &Motion<'_>, from_others: bool) -> Option<Expr> {
         let simulation = self.simulation;
         let others = || self.motions.iter().filter(|m| m.v != motion.v);
         let wound = |state: &&State| {
@@ -74,7 +79,7 @@ impl Finder<'_> {
             others().any(|m| term.uses(m.v) || m.x.is_some_and(|x| term.uses(x)))
                 || wound.iter().any(|s| term.uses(&s.name))
         };
-        let terms = forces_of(simulation, motion).filter(|(_, term)| passed(term));
+        let terms = forces_of(simulation, motion).filter(|(_, term)| passed(term) == from_others);
         let sum = terms.map(|(sign, term)| product(vec![Expr::Number(sign), term.clone()])).reduce(|a, b| a + b)?;
         let load = match force_path(simulation, motion.derivative) {
             ForcePath::Divided(mass) => mass.clone() * sum,

@@ -13,6 +13,8 @@
 
 mod algebra;
 mod balance;
+mod cascades;
+mod cells;
 mod commands;
 mod connections;
 mod find;
@@ -42,7 +44,7 @@ pub(crate) use algebra::is_linear;
 pub(crate) use balance::with_balances;
 pub(crate) use loops::play_of;
 pub(crate) use motion::{ForcePath, force_path};
-pub(crate) use sensed::{Sensed, sensed};
+pub(crate) use sensed::{Felt, Sensed, sensed};
 pub(crate) use target::{Pull, Rate, Seen, Target};
 pub(crate) use turn::{is_turn, with_turns, with_used_turns};
 

@@ -9,9 +9,20 @@ use super::balance::is_power_of_ten;
 use super::find::is_one_of;
 use crate::random::generator;
 
-/// An output that is a multiple of the derivative of a state, but for what no state moves.
+/// What a sensor feels of a force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Felt {
+    /// The acceleration that comes of it.
+    Rate,
+    /// The force itself.
+    Force,
+}
+
+/// An output that is a multiple of the derivative of a state, or of the forces that hold it, but for what no state moves.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sensed {
+    /// Which of these it is.
+    pub felt: Felt,
     /// The state.
     pub state: String,
     /// The output's column.
@@ -47,7 +58,7 @@ pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
                 (units != Some(false)).then(converted).flatten().filter(|t| units.is_some() || is_power_of_ten(*t, 1.0))
             };
             if let Some(times) = times {
-                found.push(Sensed { state: (*state).clone(), column: output.column.clone(), times });
+                found.push(Sensed { felt: Felt::Rate, state: (*state).clone(), column: output.column.clone(), times });
             }
         }
     }
@@ -55,7 +66,7 @@ pub(crate) fn sensed(simulation: &Simulation) -> Vec<Sensed> {
 }
 
 /// The numbers that a product or quotient has among its factors, and what they multiply: an acceleration in m/s^2 where the state is in mm.
-fn peeled(e: &Expr) -> (f64, Expr) {
+pub(super) fn peeled(e: &Expr) -> (f64, Expr) {
     let mut factors = Factors::of(e.clone());
     let number = factors.take_number();
     (number, product(factors.above) / product(factors.below))
@@ -76,14 +87,14 @@ fn states_in(simulation: &Simulation, a: &Expr, b: &Expr) -> usize {
 }
 
 /// Whether two expressions have a state and a parameter in common: forces in both.
-fn shares(simulation: &Simulation, a: &Expr, b: &Expr) -> bool {
+pub(super) fn shares(simulation: &Simulation, a: &Expr, b: &Expr) -> bool {
     let both = |name: &str| a.uses(name) && b.uses(name);
     states_in(simulation, a, b) > 0 && simulation.parameters.iter().any(|p| both(&p.name))
 }
 
 /// The number by which `b` must be multiplied to move with the states as `a` does; `None` where there is none. It must be the same for other
 /// parameters, and where numbers are `shaking` for other numbers in the equations: `v` is a multiple of `(u - 2*v)/3` in one simulation only.
-fn multiple(simulation: &Simulation, a: &Expr, b: &Expr, shaking: bool) -> Option<f64> {
+pub(super) fn multiple(simulation: &Simulation, a: &Expr, b: &Expr, shaking: bool) -> Option<f64> {
     let mut known: Option<f64> = None;
     for round in 0..3 {
         let values = values(simulation, [a, b].map(|e| if shaking { shaken(e, round) } else { e.clone() }), round)?;

@@ -1,0 +1,87 @@
+//! Load cells: outputs that measure what holds a part, or what connects it to another. An effect that acts there is in them too, or beside them: what a
+//! bearing of the machine rubs with is not in what a cell under the spring feels.
+
+use hysid_plant::Unit;
+
+use super::balance::is_power_of_ten;
+use super::find::{Finder, presses};
+use super::sensed::{Felt, Sensed, multiple, peeled, shares};
+use super::{Place, Slot, Target};
+
+impl Finder<'_> {
+    /// The force slots once more whose forces a load cell measures, as those that it feels.
+    pub(super) fn in_load_cells(&self, slots: &[Slot]) -> Vec<Slot> {
+        slots.iter().filter_map(|slot| self.in_load_cell(slot)).collect()
+    }
+
+    fn in_load_cell(&self, slot: &Slot) -> Option<Slot> {
+        let simulation = self.original;
+        let connects = match slot.place {
+            Place::Force => false,
+            Place::Connection => true,
+            _ => return None,
+        };
+        let Target::Derivatives(pulls) = &slot.target else { return None };
+        let state = &pulls.first()?.state;
+        let motion = self.motions.iter().find(|m| m.state == state)?;
+        let (scale, held) = peeled(&self.forces_on(motion, connects)?);
+        let cell = |output: &hysid_plant::Output| {
+            let (factor, inner) = peeled(&output.expression);
+            let is_force = Unit::of_column(&output.column).is_none_or(|u| presses(&u));
+            if !is_force || slot.sensed.iter().any(|s| s.column == output.column) || !shares(simulation, &inner, &held)
+            {
+                return None;
+            }
+            let times = factor / scale * multiple(simulation, &inner, &held, true)?;
+            let column = output.column.clone();
+            is_power_of_ten(times.abs(), 1.0).then(|| Sensed { felt: Felt::Force, state: state.clone(), column, times })
+        };
+        let cells: Vec<Sensed> = simulation.outputs.iter().filter_map(cell).collect();
+        let columns: Vec<&str> = cells.iter().map(|c| c.column.as_str()).collect();
+        let whereabouts = format!("{}, felt by {}", slot.whereabouts, columns.join(" and "));
+        (!cells.is_empty()).then(|| Slot {
+            whereabouts,
+            sensed: slot.sensed.iter().cloned().chain(cells).collect(),
+            ..slot.clone()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::mechanism::conformance::example_signals;
+    use crate::mechanism::{Purpose, mechanism};
+    use crate::slot::Structure;
+
+    fn caliper(cell: &str) -> Simulation {
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\np = \"line_bar\"\n[parameters]\nk = {{ value = 25.0, min = 1.0, unit = \"kN/mm\" }}\n\
+             c = {{ value = 0.1, min = 0.01, unit = \"kN s/mm\" }}\nm = {{ value = 200.0, min = 10.0, unit = \"kg\" }}\n\
+             [states]\nx = {{ derivative = \"v\", initial = 0.0, unit = \"mm\" }}\nv = {{ derivative = \"(0.23*p - c*v - k*x)/(m/1000000)\", initial = 0.0, unit = \"mm/s\" }}\n\
+             [outputs]\npad_kN = \"{cell}\"\npiston_mm = \"x\"\n"
+        );
+        Simulation::parse(&text, "caliper.sim.toml").unwrap()
+    }
+
+    #[test]
+    fn what_a_load_cell_feels_is_written_into_it() {
+        let written = |cell: &str| {
+            let simulation = caliper(cell);
+            let spring = mechanism("quadratic_stiffness").unwrap();
+            let slots = spring.slots(&Structure::of(&simulation));
+            let forms = slots.iter().map(|slot| {
+                let signals = example_signals(&simulation, slot);
+                let written = spring.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap();
+                written.simulation.outputs[0].expression.to_string()
+            });
+            forms.collect::<Vec<_>>()
+        };
+        assert_eq!(written("k*x + c*v"), ["k*x + c*v", "k*x + c*v + k_2*x^2"]);
+        assert_eq!(written("-1000*(k*x + c*v)"), ["-1000*(k*x + c*v)", "-1000*(k*x + c*v) - 1000*(k_2*x^2)"]);
+        // A part of what holds it, and what is no force, is no load cell.
+        assert_eq!(written("k*x").len(), 1);
+    }
+}
