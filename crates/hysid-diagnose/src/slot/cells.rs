@@ -51,7 +51,6 @@ impl Finder<'_> {
 mod tests {
     use hysid_plant::Simulation;
 
-    use super::*;
     use crate::mechanism::conformance::example_signals;
     use crate::mechanism::{Purpose, mechanism};
     use crate::slot::Structure;

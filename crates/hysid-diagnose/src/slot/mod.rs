@@ -35,8 +35,7 @@ use std::fmt::{self, Display, Formatter};
 
 use hysid_plant::{Expr, Function, Simulation, Unit};
 
-use find::{is_one_of, presses};
-use stores::ELECTRICAL;
+use find::presses;
 
 pub use find::Structure;
 
@@ -379,11 +378,6 @@ impl Slot {
     /// Whether what leaves this store by its own outflow arrives in another one.
     pub(crate) fn feeds_another(&self) -> bool {
         self.feeds
-    }
-
-    /// Whether what is held here is electrical, which leaves through a resistance and through no opening.
-    pub(crate) fn is_electrical(&self) -> bool {
-        self.quantity("s").and_then(|q| q.unit.as_ref()).is_some_and(|u| is_one_of(u, ELECTRICAL))
     }
 
     /// Whether the equations here contain a square root of an expression that uses this symbol.

@@ -2,13 +2,29 @@
 
 use hysid_plant::Expr;
 
-use super::find::{Finder, has_unit};
+use super::find::{Finder, has_unit, is_one_of};
 use super::motion::CHARGED;
 use super::pattern::roots;
 use super::{Place, Pull, Slot, Target};
 
 /// Units of electrical states.
-pub(super) const ELECTRICAL: &[&str] = &["Wb", "A", "C", "V"];
+const ELECTRICAL: &[&str] = &["Wb", "A", "C", "V"];
+
+impl Slot {
+    /// Whether what is held here is electrical, which leaves through a resistance and through no opening.
+    pub(crate) fn is_electrical(&self) -> bool {
+        self.holds(ELECTRICAL)
+    }
+
+    /// Whether what is held here is heat.
+    pub(crate) fn is_thermal(&self) -> bool {
+        self.holds(&["K"])
+    }
+
+    fn holds(&self, units: &[&str]) -> bool {
+        self.quantity("s").and_then(|q| q.unit.as_ref()).is_some_and(|u| is_one_of(u, units))
+    }
+}
 
 impl Finder<'_> {
     pub(super) fn store_slot(&self, place: Place, label: String, name: &str, derivative: &Expr) -> Slot {

@@ -1,6 +1,6 @@
 //! A store that spills what exceeds its brim.
 
-use crate::mechanism::{Block, Family, Grid, Law, Mechanism, anywhere};
+use crate::mechanism::{Block, Family, Grid, Law, Mechanism};
 use crate::slot::Place;
 
 /// A store that spills what exceeds its brim.
@@ -9,7 +9,8 @@ pub static OVERFLOW: Mechanism = Mechanism {
     family: Family::Storage,
     block: Block::Restoring,
     places: &[Place::Store],
-    applies: anywhere,
+    // Heat has no brim: what leaves it faster when it is hot is another law.
+    applies: |slot| !slot.is_thermal(),
     already: &["max(s - P, 0)", "min(s, P)"],
     law: |_, _| {
         Law::outflow("c_o*max(s - s_max, 0)")
