@@ -67,13 +67,15 @@ impl<'d> Remaining<'d> {
         let generic = if imitates || spectrum { search.open(none) } else { None };
         let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
         let outdone = imitates && generic.as_ref().is_some_and(outdone);
+        // What was not looked at is not known to be nothing.
+        let left = seen.is_some() || test.as_ref().is_none_or(|t| t.tells(alpha));
+        // One law that leaves nothing is no imitation that generic terms could tell from it but by their price.
+        let doubtful = imitates && (left || best.effects.len() > 1);
         let (swapped, tried) =
-            if imitates && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { (None, None) };
+            if doubtful && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { (None, None) };
         let outdone = outdone || swapped.is_some();
         let foreign = imitates && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
-        // What was not looked at is not known to be nothing.
-        let significant = |t: &SurrogateTest| t.tells(alpha);
-        let imperfect = winner > 0 && (foreign || spectrum || seen.is_some() || test.as_ref().is_none_or(significant));
+        let imperfect = winner > 0 && (foreign || spectrum || left);
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
         let instead = generic.filter(|g| spectrum || (outdone && swapped.is_none() && g.gain > both));
