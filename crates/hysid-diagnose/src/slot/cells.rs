@@ -38,7 +38,7 @@ impl Finder<'_> {
         };
         let cells: Vec<Sensed> = simulation.outputs.iter().filter_map(cell).collect();
         let columns: Vec<&str> = cells.iter().map(|c| c.column.as_str()).collect();
-        let whereabouts = format!("{}, felt by {}", slot.whereabouts, columns.join(" and "));
+        let whereabouts = format!("{} (felt by {})", slot.whereabouts, columns.join(" and "));
         (!cells.is_empty()).then(|| Slot {
             whereabouts,
             sensed: slot.sensed.iter().cloned().chain(cells).collect(),
