@@ -30,8 +30,8 @@ pub static QUANTISATION: Mechanism = Mechanism {
 /// What a converter shows in the mean of a signal with noise of `d_q` steps (rms) before it: a stair whose edges are as wide as the noise, here logistic
 /// ones (within a hundredth and a half of a step of those of Gaussian noise). Noise of more than two thirds of a step leaves nothing of the stair.
 fn blurred() -> Law {
-    let edge = |from: &str| format!("tanh((y/q - floor(y/q) - {from})/(1.175*d_q))");
-    let edges = [edge("0.5"), edge("1.5"), format!("tanh((y/q - floor(y/q) + 0.5)/(1.175*d_q))")].join(" + ");
+    let edge = |off: &str| format!("tanh((y/q - floor(y/q) {off})/(1.175*d_q))");
+    let edges = ["- 0.5", "- 1.5", "+ 0.5"].map(edge).join(" + ");
     Law::replace(format!("q*(floor(y/q) + 0.5 + 0.5*({edges}))"))
         .constant("q", "y", Grid::Resolution)
         .shape("d_q", "1", Grid::Values(vec![0.15, 0.3]))
