@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::common::hysid;
 use assert_cmd::Command;
 
 /// 300 samples of a loop, with columns `t_s,u_V,y_mm,flat_V`.
@@ -33,8 +34,8 @@ fn replaced(from: &str, to: &str) -> Vec<u8> {
 
 /// Runs the program; returns status and stderr.
 fn run(args: &[&str], dir: &Path) -> (i32, String) {
-    let output = Command::cargo_bin("hysid").unwrap().current_dir(dir).args(args).output().unwrap();
-    (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
+    let (status, _, stderr) = hysid(args, dir);
+    (status, stderr)
 }
 
 #[test]

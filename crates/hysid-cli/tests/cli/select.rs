@@ -3,17 +3,10 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use assert_cmd::Command;
+use crate::common::hysid;
 use hysid_dictionary::{Design, Record, Signals, Spec};
 use hysid_select::{Criterion, Options, Search, select};
 use serde_json::Value;
-
-/// Runs the program; returns status, stdout and stderr.
-fn run(args: &[&str], dir: &Path) -> (i32, String, String) {
-    let output = Command::cargo_bin("hysid").unwrap().current_dir(dir).args(args).output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
-}
 
 /// Uniform numbers in -1..1.
 fn uniform(state: &mut u64) -> f64 {
@@ -90,7 +83,7 @@ fn agree(file: &Path, name: &str, inputs: &[&str], output: &str, delay: &str, te
     let mut args = vec!["select", "--recording", file.to_str().unwrap(), "--output", output, "--input-delay", delay];
     inputs.iter().for_each(|u| args.extend(["--input", u]));
     args.extend(["--lags-output", "2", "--lags-input", "2", "--terms", &count, "--search", "greedy", "--json"]);
-    let (status, out, err) = run(&args, Path::new("."));
+    let (status, out, err) = hysid(&args, Path::new("."));
     assert_eq!((status, err.as_str()), (0, ""), "{name}");
     let found: Value = serde_json::from_str(&out).unwrap();
     let terms = found["terms"].as_array().unwrap();
@@ -103,7 +96,7 @@ fn agree(file: &Path, name: &str, inputs: &[&str], output: &str, delay: &str, te
     }
     assert_eq!(found["samples"], expected.samples);
     for threads in ["1", "2", "3"] {
-        let again = run(&[&args[..], &["--threads", threads]].concat(), Path::new("."));
+        let again = hysid(&[&args[..], &["--threads", threads]].concat(), Path::new("."));
         assert_eq!(again.1, out, "{name}: {threads} threads");
     }
     found
@@ -165,7 +158,7 @@ fn bad_input_ends_it_with_one_message() {
             args.extend(["--output", "y"]);
         }
         args.extend(more);
-        let (status, out, err) = run(&args, dir.path());
+        let (status, out, err) = hysid(&args, dir.path());
         assert_eq!((status, out.as_str()), (2, ""), "{more:?}: {err}");
         assert_eq!(err.lines().count(), 1, "{err}");
         for part in expected {
@@ -184,7 +177,7 @@ fn a_fault_after_a_million_rows_is_told_with_its_place() {
     std::fs::write(dir.path().join("r.csv"), text).unwrap();
     for threads in ["1", "2"] {
         let args = ["select", "--recording", "r.csv", "--input", "u", "--output", "y", "--threads", threads];
-        let (status, out, err) = run(&args, dir.path());
+        let (status, out, err) = hysid(&args, dir.path());
         let told = "hysid: r.csv, line 1000002, column `y`: `4..5` is not a number (an empty field or `NaN` stands for a missing sample)\n";
         assert_eq!((status, out.as_str(), err.as_str()), (2, "", told));
     }

@@ -26,6 +26,8 @@ const NOTHING: f64 = 0.05;
 pub struct Converter {
     /// Its place in the set.
     pub member: usize,
+    /// The place of the output that it converts.
+    output: usize,
     /// The column and the step, in words.
     words: String,
 }
@@ -62,7 +64,7 @@ impl Search<'_, '_> {
             let off = |y: f64| ((y - low) / q - ((y - low) / q).round()).abs();
             let own = high - low >= FINE * q && recorded().all(|y| off(y) <= OFF_A_STEP);
             let words = format!("`{}` ({})", outputs[place].column, number_with_unit(q, step.unit.as_ref()));
-            own.then_some(Converter { member, words })
+            own.then_some(Converter { member, output: place, words })
         };
         set.effects.iter().enumerate().filter_map(fine).collect()
     }
@@ -78,9 +80,8 @@ impl Search<'_, '_> {
         let before = rms(none);
         let takes = |h: &Hypothesis<'_>| {
             let after = rms(h);
-            let outputs = self.setting.original.outputs.iter().enumerate();
-            let is_rounded = |column: &str| set.effects.iter().any(|e| e.slot.label == format!("output:{column}"));
-            outputs.filter(|(_, o)| !is_rounded(&o.column)).any(|(i, _)| after[i] < (1.0 - NOTHING) * before[i])
+            let is_rounded = |output: &usize| converters.iter().any(|c| c.output == *output);
+            (0..after.len()).filter(|i| !is_rounded(i)).any(|i| after[i] < (1.0 - NOTHING) * before[i])
         };
         (!pool.iter().any(takes)).then(|| {
             format!(

@@ -1,7 +1,7 @@
 //! Load cells: outputs that measure what holds a part, or what connects it to another. An effect that acts there is in them too, or beside them: what a
 //! bearing of the machine rubs with is not in what a cell under the spring feels.
 
-use hysid_plant::Unit;
+use hysid_plant::{Output, Unit};
 
 use super::balance::is_power_of_ten;
 use super::find::{Finder, presses};
@@ -25,7 +25,7 @@ impl Finder<'_> {
         let state = &pulls.first()?.state;
         let motion = self.motions.iter().find(|m| m.state == state)?;
         let (scale, held) = peeled(&self.forces_on(motion, connects)?);
-        let cell = |output: &hysid_plant::Output| {
+        let cell = |output: &Output| {
             let (factor, inner) = peeled(&output.expression);
             let is_force = Unit::of_column(&output.column).is_none_or(|u| presses(&u));
             if !is_force || slot.sensed.iter().any(|s| s.column == output.column) || !shares(simulation, &inner, &held)
@@ -34,7 +34,7 @@ impl Finder<'_> {
             }
             let times = factor / scale * multiple(simulation, &inner, &held, true)?;
             let column = output.column.clone();
-            is_power_of_ten(times.abs(), 1.0).then(|| Sensed { felt: Felt::Force, state: state.clone(), column, times })
+            is_power_of_ten(times, 1.0).then(|| Sensed { felt: Felt::Force, state: state.clone(), column, times })
         };
         let cells: Vec<Sensed> = simulation.outputs.iter().filter_map(cell).collect();
         let columns: Vec<&str> = cells.iter().map(|c| c.column.as_str()).collect();
@@ -80,7 +80,7 @@ mod tests {
         };
         assert_eq!(written("k*x + c*v"), ["k*x + c*v", "k*x + c*v + k_2*x^2"]);
         assert_eq!(written("-1000*(k*x + c*v)"), ["-1000*(k*x + c*v)", "-1000*(k*x + c*v) - 1000*(k_2*x^2)"]);
-        // A part of what holds it, and what is no force, is no load cell.
+        // What measures a part of that is no load cell.
         assert_eq!(written("k*x").len(), 1);
     }
 }
