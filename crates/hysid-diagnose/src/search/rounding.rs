@@ -41,7 +41,7 @@ impl Converter {
     /// Why they are not told as effects.
     pub fn note(all: &[Self]) -> String {
         format!(
-            "the rounding of the converter to the steps of {} is in the recording too, and is taken for its own: it is written, and is no physics that is missing",
+            "the rounding of the converter to the steps of {} is in the recording too, and is taken for its own: it is no physics that is missing",
             Self::list(all)
         )
     }
