@@ -5,6 +5,7 @@
 //! gives the stretches without one. There are no files here (see `hysid-io`) and no models.
 
 mod autoregression;
+mod cosine;
 mod excitation;
 mod noise;
 mod range;
@@ -14,6 +15,7 @@ pub mod tell;
 mod turning_points;
 
 pub use autoregression::Autoregression;
+pub use cosine::{cosine_transform, inverse_cosine_transform};
 pub use excitation::{Excitation, ExcitationError, modulate};
 pub use noise::{NoiseError, autoregressive_noise, variance_for_snr, white_noise};
 pub use range::range;

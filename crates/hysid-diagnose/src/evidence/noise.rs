@@ -6,19 +6,18 @@
 //! residual would count as white, and a model that removes it would gain nothing in likelihood. BIC decides whether the shape is there, and
 //! whether process noise ([`super::ForcePath`]) says the same in fewer coefficients.
 //!
-//! The shape is taken from the autoregression's innovations. Their wrap from end to start is the approximation (the autoregression has
-//! taken the steep part of the spectrum by then).
+//! The shape is taken from the autoregression's innovations, in cosines: that their mirror image continues them is the approximation.
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 
-use hysid_signal::{Autoregression, fourier};
+use hysid_signal::{Autoregression, cosine_transform};
 
 use super::below::Below;
 use super::driven::Driven;
 use super::projector::norm2;
 use super::response::ForcePath;
-use super::shape::{SpectralShape, corners, even_knots, log_frequency, multiplicity, rise};
+use super::shape::{FIRST, SpectralShape, corners, even_knots, frequency, rise};
 
 /// Orders up to which a short autoregression is tried with a corner, beside the one that BIC chooses without a shape.
 const SHORT_ORDERS: [usize; 2] = [0, 2];
@@ -112,16 +111,16 @@ impl NoiseModel {
             let n = s.len();
             let mut w = vec![0.0; n];
             ar.whiten(s, &mut w);
-            // The mean is left out: a single line of any height is nothing that a spectrum's shape may follow, and an offset is an effect.
-            for (k, (re, im)) in fourier(&w).iter().enumerate().skip(1) {
-                let power = (re * re + im * im) / n as f64;
+            cosine_transform(&mut w);
+            for (k, line) in w.iter().enumerate().skip(FIRST) {
+                let power = line * line;
                 if !power.is_finite() {
                     return Self::of(ar, None);
                 }
-                // Neighbours between which no shape bends are one line of higher multiplicity.
-                let (x, m) = (log_frequency(k, n), multiplicity(k, n));
+                // Neighbours between which no shape bends are one.
+                let x = frequency(k, n).ln();
                 let bin = bins.entry((x * BINS / LN_2).floor() as i64).or_default();
-                *bin = (bin.0 + m * x, bin.1 + m * power, bin.2 + m);
+                *bin = (bin.0 + x, bin.1 + power, bin.2 + 1.0);
             }
         }
         let lines: Vec<(f64, f64, f64)> = bins.into_values().map(|(x, p, m)| (x / m, p / m, m)).collect();
@@ -131,7 +130,7 @@ impl NoiseModel {
         for knots in shapes {
             let Some((shape, gain)) = SpectralShape::fit(knots.clone(), &lines) else { continue };
             let gain = gain - price * shape.coefficients() as f64;
-            if gain > best.1 && shape.rise(longest) > -HOLE {
+            if gain > best.1 && shape.rise(longest) > -HOLE && !shape.is_peak() {
                 best = (Some(shape), gain);
             }
         }
@@ -147,11 +146,11 @@ impl NoiseModel {
     fn exponent(&self, n: usize) -> f64 {
         // Whatever passes through the plant is known by its way down to the plant's corner, and 1/f noise is easily taken for it.
         let Kind::Shaped(ar, shape) = &self.kind else { return 1.0 };
-        let rise = rise(|k| ar.log_power(k as f64 / n as f64) + shape.as_ref().map_or(0.0, |s| s.log_power(k, n)));
+        let rise = rise(|k| ar.log_power(frequency(k, n)) + shape.as_ref().map_or(0.0, |s| s.log_power(k, n)));
         // Where a shape is needed for the lowest lines it is 1/f noise at least, whatever the few lines say of its slope. An autoregression is
         // flat below its reach, whatever the noise does there.
         let slow =
-            if shape.is_some() { rise > RISING } else { ar.log_power(1.0 / n as f64) - ar.log_power(0.25) > LN_2 };
+            if shape.is_some() { rise > RISING } else { ar.log_power(frequency(FIRST, n)) - ar.log_power(0.25) > LN_2 };
         if slow { rise.max(1.0) } else { rise }
     }
 

@@ -1,25 +1,30 @@
 //! The shape of a spectrum on a logarithmic frequency axis: piecewise linear in the logarithms of frequency and power.
 //!
-//! Knots stand one or two octaves apart, or there is a single corner; heights are fitted by Whittle's likelihood to the lines of discrete Fourier
+//! Knots stand one or two octaves apart, or there is a single corner; heights are fitted by Whittle's likelihood to the lines of discrete cosine
 //! transforms. Removing a shape divides the lines by its root: an orthogonal transform, a scaling, and back, so rows stay in order of time.
+//! Fourier transforms would take the end of a recording and its beginning for neighbours: noise that wanders jumps there, the jump is a noise of all
+//! frequencies, and no shape could be told from it.
 //!
-//! Reference: P. Whittle (1953); P. J. Brockwell and R. A. Davis, Time Series, section 10.8.
+//! Reference: P. Whittle (1953); P. J. Brockwell and R. A. Davis, Time Series, section 10.8; for the lines, R. J. Clarke, IEE Proc. F 128 (1981) 359-360.
 
 use std::f64::consts::LN_2;
 
-use hysid_signal::{fourier, inverse_fourier};
+use hysid_signal::{cosine_transform, inverse_cosine_transform};
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviation of the prior of a knot's log power about 0: what the simulation's own parameters have taken out of the residual
 /// must not look like a noise of power zero.
 const PRIOR_SD: f64 = 3.0;
 
-/// Lines up to which the rise towards low frequency is measured, from the first; the steepest counts.
-const LAST: [usize; 2] = [8, 32];
+/// The first line of a whole period, from which on shapes are fitted. What a half period would tell is what the mean would: a single line of any height is
+/// nothing that a spectrum's shape may follow, a drift is an effect, and an offset is one.
+pub(super) const FIRST: usize = 2;
+/// Lines up to which the rise towards low frequency is measured, from the first of a whole period; the steepest counts.
+const LAST: [usize; 2] = [8 * FIRST, 32 * FIRST];
 
-/// The exponent by which a power falls with frequency from the first line on, given its logarithm at each.
+/// The exponent by which a power falls with frequency from the first line of a whole period on, given its logarithm at each.
 pub(super) fn rise(log_power: impl Fn(usize) -> f64) -> f64 {
-    let slope = |last: usize| (log_power(1) - log_power(last)) / (last as f64).ln();
+    let slope = |last: usize| (log_power(FIRST) - log_power(last)) / ((last / FIRST) as f64).ln();
     LAST.into_iter().map(slope).fold(f64::NEG_INFINITY, f64::max)
 }
 
@@ -32,19 +37,14 @@ pub struct SpectralShape {
     heights: Vec<f64>,
 }
 
-/// Line `k` of `n` samples as a logarithm of frequency; the mean counts as half the first line.
-pub(super) fn log_frequency(k: usize, n: usize) -> f64 {
-    ((k as f64).max(0.5) / n as f64).ln()
-}
-
-/// How many real numbers line `k` of `n` samples stands for.
-pub(super) fn multiplicity(k: usize, n: usize) -> f64 {
-    if k == 0 || 2 * k == n { 1.0 } else { 2.0 }
+/// Frequency of line `k` of `n` samples, in cycles a sample; the mean counts as the first line.
+pub(super) fn frequency(k: usize, n: usize) -> f64 {
+    k.max(1) as f64 / (2 * n) as f64
 }
 
 /// Knots everywhere between the lowest frequency of `n` samples and the highest, one or two octaves apart.
 pub(super) fn even_knots(n: usize) -> Vec<Vec<f64>> {
-    let (low, high) = ((1.0 / n as f64).ln(), 0.5f64.ln());
+    let (low, high) = (frequency(FIRST, n).ln(), 0.5f64.ln());
     let even = |octaves: f64| {
         let count = ((high - low) / (octaves * LN_2)).round().max(1.0) as usize;
         (0..=count).map(|i| low + (high - low) * i as f64 / count as f64).collect()
@@ -57,7 +57,7 @@ pub(super) fn even_knots(n: usize) -> Vec<Vec<f64>> {
 /// Noise that rises below a corner (1/f, a random walk beside white noise) is so told in a few coefficients: were only the many on offer,
 /// an effect with two would be a cheap way to say the same.
 pub(super) fn corners(n: usize) -> Vec<Vec<f64>> {
-    let (low, high) = ((1.0 / n as f64).ln(), 0.5f64.ln());
+    let (low, high) = (frequency(FIRST, n).ln(), 0.5f64.ln());
     let last = ((high - low) / LN_2).floor() as usize;
     (2..last).map(|octave| vec![low, low + octave as f64 * LN_2, high]).collect()
 }
@@ -76,9 +76,13 @@ fn between(knots: &[f64], x: f64) -> (usize, f64) {
 }
 
 impl SpectralShape {
-    /// Natural logarithm of the power at line `k` of `n` samples.
+    /// Natural logarithm of the power at line `k` of `n` samples. Below the first knot what rises goes on rising.
     pub(super) fn log_power(&self, k: usize, n: usize) -> f64 {
-        let (i, w) = between(&self.knots, log_frequency(k, n));
+        let x = frequency(k, n).ln();
+        let (i, w) = match (self.knots.as_slice(), self.heights.as_slice()) {
+            (&[first, second, ..], &[low, high, ..]) if x < first && low > high => (0, (x - first) / (second - first)),
+            _ => between(&self.knots, x),
+        };
         let above = self.heights.get(i + 1).copied().unwrap_or(self.heights[i]);
         (1.0 - w) * self.heights[i] + w * above
     }
@@ -86,13 +90,17 @@ impl SpectralShape {
     /// Multiplies the lines of `x` by `exp(sign/2 log power)` in place.
     pub(super) fn scale(&self, x: &mut [f64], sign: f64) {
         let n = x.len();
-        let mut lines = fourier(x);
-        for (k, line) in lines.iter_mut().enumerate() {
-            let factor = (0.5 * sign * self.log_power(k, n)).exp();
-            line.0 *= factor;
-            line.1 *= factor;
+        cosine_transform(x);
+        for (k, line) in x.iter_mut().enumerate() {
+            *line *= (0.5 * sign * self.log_power(k, n)).exp();
         }
-        x.copy_from_slice(&inverse_fourier(&lines, n));
+        inverse_cosine_transform(x);
+    }
+
+    /// Whether it has a single corner from which it falls to both sides: no noise does, but the few lines below a low corner do by chance, and an offset
+    /// would stand out of them.
+    pub(super) fn is_peak(&self) -> bool {
+        matches!(self.heights.as_slice(), &[low, corner, high] if low < corner && corner > high)
     }
 
     /// [`rise`] of the lowest lines of `n` samples.
@@ -107,10 +115,10 @@ impl SpectralShape {
 
     /// Half the logarithm of the determinant of `n` samples' covariance.
     pub(super) fn log_scale(&self, n: usize) -> f64 {
-        (0..=n / 2).map(|k| 0.5 * multiplicity(k, n) * self.log_power(k, n)).sum()
+        (0..n).map(|k| 0.5 * self.log_power(k, n)).sum()
     }
 
-    /// Fits heights at `knots` to the lines of several series: (log frequency, power, multiplicity). Returns the shape and its gain in log
+    /// Fits heights at `knots` to the lines of several series: (log frequency, power, how many). Returns the shape and its gain in log
     /// likelihood over a flat spectrum of power 1.
     pub(super) fn fit(knots: Vec<f64>, lines: &[(f64, f64, f64)]) -> Option<(Self, f64)> {
         let m = knots.len();
