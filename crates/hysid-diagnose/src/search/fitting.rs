@@ -118,6 +118,26 @@ const MOST_COMPLETE: usize = 8;
 /// Log evidence by which a candidate may trail after a few iterations and still be refitted to the end.
 pub const HOPELESS: f64 = 40.0;
 
+/// A sketch that fits worse than the simulation without its effect is none of the effect's best: it has not come near a minimum, or it was fitted under a noise
+/// that is no longer there (where 1/f noise hid a drift, the mean was free). Where the effect promised more than the threshold it is fitted on, under the noise
+/// that it leaves.
+fn brought_home<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    sketched: Hypothesis<'d>,
+    threshold: f64,
+) -> Hypothesis<'d> {
+    let strayed = sketched.log_evidence < threshold && sketched.base.log_likelihood < parent.base.log_likelihood;
+    if !strayed || parent.log_evidence + candidate.score() < threshold || setting.budget.omits(Step::Fits) {
+        return sketched;
+    }
+    let own = Some(&sketched.base.whitener);
+    let longer = setting.further(&sketched.base, own, 1, setting.iterations);
+    let longer = longer.map(|base| hypothesis(setting, parent, candidate, base));
+    longer.filter(|h| h.log_evidence > sketched.log_evidence).unwrap_or(sketched)
+}
+
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
 ///
 /// A few iterations from the best start tell who is hopeless (but within a loop of the simulation); the others are refitted to the end, from all their
@@ -144,7 +164,7 @@ pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Ca
     let mut out: Vec<Hypothesis<'d>> = list
         .par_iter()
         .zip(first)
-        .filter_map(|(c, (froms, sketched))| match sketched {
+        .filter_map(|(c, (froms, sketched))| match sketched.map(|h| brought_home(setting, parent, c, h, threshold)) {
             Some(h) if h.log_evidence < threshold && !is_in_a_loop(c) => Some(h),
             sketched if setting.budget.omits(Step::Fits) => sketched,
             sketched => refit_from(setting, parent, c, froms, sketched.map(|h| h.base)),
