@@ -13,6 +13,7 @@ mod course;
 mod followed;
 mod modulation;
 pub mod needed;
+mod past;
 mod regress;
 pub mod shapes;
 mod signature;
@@ -349,5 +350,34 @@ mod tests {
         let first = &found.record.terms[0];
         assert_eq!(found.record.slot, "state:fin", "{:?}", found.record.terms);
         assert!(first.term.starts_with("max(rate_fin") && first.coefficient < -0.3, "{first:?}");
+    }
+
+    /// A force that comes late, as from the cut of the turn before, with a noise of one in a hundred.
+    #[test]
+    fn a_delayed_feedback_is_seen() {
+        let text = "[time]\nperiod_s = 0.02\n[inputs]\nu = \"force_N\"\n[parameters]\nm = { value = 1.0, min = 0.3, max = 3.0, unit = \"kg\" }\n\
+                    c = { value = 2.0, min = 0.5, max = 8.0, unit = \"N s/m\" }\nk = { value = 80.0, min = 30.0, max = 200.0, unit = \"N/m\" }\n[states]\n\
+                    x = { derivative = \"v\", initial = 0.0, unit = \"m\" }\nv = { derivative = \"(u - c*v - k*x)/m\", initial = 0.0, unit = \"m/s\" }\n\
+                    [outputs]\ny_m = \"x\"\n";
+        let original = Simulation::parse(text, "tool.sim.toml").unwrap();
+        let mut truth = original.clone();
+        truth.state_mut("v").unwrap().derivative =
+            hysid_plant::Expr::parse("(u - c*v - k*x - 12*delay(x, 0.37))/m").unwrap();
+        let mut random = normal(6);
+        let u = drive(1500, &mut random);
+        let compiled = Compiled::new(&truth).unwrap();
+        let run = Drive::new(0.0, PERIOD, u.len(), vec![u.clone()]).unwrap();
+        let mut y = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs.swap_remove(0);
+        let noise = 0.01 * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * random());
+        let data = recorded(&original, PERIOD, [("force_N", u), ("y_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (_, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let found = correction(&none.base, NoiseKind::White(1.0)).unwrap();
+        let first = &found.record.terms[0];
+        let late = first.term.strip_prefix("delay(x, ").and_then(|t| t.strip_suffix(')'));
+        let late: f64 = late.unwrap_or_else(|| panic!("{:?}", found.record.terms)).parse().unwrap();
+        assert!((late - 0.37).abs() < 0.06 && (first.coefficient / -12.0 - 1.0).abs() < 0.3, "{first:?}");
+        assert_eq!((found.record.slot.as_str(), found.record.signature.memory.as_str()), ("state:v", "rate_dependent"));
     }
 }

@@ -1,5 +1,5 @@
-//! The shapes of generic terms: curves, knees, plays and relays of one coordinate, what lags leave of it, coefficients that change in time, and
-//! products of a function of the displacement with one of the velocity.
+//! The shapes of generic terms: curves, knees, plays and relays of one coordinate, coefficients that change in time, and products of a function of the
+//! displacement with one of the velocity. What lags and delays make of a coordinate: [`super::past`].
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use hysid_signal::range;
 
 use super::course::Series;
 use super::written::FORM;
-use crate::data::{DataSet, Stretch};
+use crate::data::DataSet;
 use crate::evidence::quantile;
 use crate::text::number;
 
@@ -38,7 +38,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    fn new(text: String, kind: Kind, series: Series) -> Self {
+    pub(super) fn new(text: String, kind: Kind, series: Series) -> Self {
         Self { text, kind, series }
     }
 }
@@ -49,9 +49,6 @@ const KNEES: [f64; 2] = [0.5, 0.8];
 const LIMITS: [f64; 4] = [0.5, 0.75, 0.9, 0.97];
 const WIDTHS: [f64; 3] = [0.2, 0.5, 0.8];
 const WIDTH: f64 = 0.7;
-
-/// Time constants of lags, as parts of the longest stretch.
-const LAGS: [f64; 3] = [300.0, 60.0, 12.0];
 
 /// Tents over the recording by which a coordinate's coefficient may change.
 const TENTS: usize = 6;
@@ -68,7 +65,7 @@ const SHIFTS: [(f64, f64); 4] = [(0.2, 0.5), (0.5, 0.8), (0.2, 0.8), (0.3, 0.7)]
 
 /// A knee, a width or a wave number as it is written: three digits, and more where they would make it one of the numbers that are part of a term's form
 /// ([`FORM`]), which no fit moves.
-fn free(x: f64) -> String {
+pub(super) fn free(x: f64) -> String {
     let rounded = number(x);
     if !FORM.iter().any(|n| rounded.parse() == Ok(*n)) {
         return rounded;
@@ -94,7 +91,7 @@ fn both(a: &[Vec<f64>], b: &[Vec<f64>], f: impl Fn(f64, f64) -> f64) -> Series {
 }
 
 /// What follows from each sample and what was before, from the first sample of each stretch on.
-fn in_turn<S>(x: &[Vec<f64>], start: impl Fn(f64) -> S, next: impl Fn(&mut S, f64) -> f64) -> Series {
+pub(super) fn in_turn<S>(x: &[Vec<f64>], start: impl Fn(f64) -> S, next: impl Fn(&mut S, f64) -> f64) -> Series {
     let stretch = |s: &Vec<f64>| {
         let mut state = start(s.first().copied().unwrap_or(0.0));
         s.iter().map(|v| next(&mut state, *v)).collect()
@@ -103,7 +100,7 @@ fn in_turn<S>(x: &[Vec<f64>], start: impl Fn(f64) -> S, next: impl Fn(&mut S, f6
 }
 
 /// A function of all samples, in order of size.
-fn sorted(x: &[Vec<f64>], f: impl Fn(f64) -> f64) -> Vec<f64> {
+pub(super) fn sorted(x: &[Vec<f64>], f: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut all: Vec<f64> = x.iter().flatten().map(|v| f(*v)).collect();
     all.sort_by(f64::total_cmp);
     all
@@ -174,29 +171,6 @@ fn switched(x: &[Vec<f64>], lower: f64, upper: f64) -> Series {
         *up
     };
     in_turn(x, |_| -1.0, switch)
-}
-
-/// What first-order lags of a coordinate leave of it: time constants of the length of the recording.
-pub fn lags(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
-    let longest = data.stretches.iter().map(|s| s.len() as f64 * s.drive.period_s()).fold(0.0, f64::max);
-    LAGS.map(|part| {
-        let tau = longest / part;
-        // Exact where the coordinate is linear between samples.
-        let behind = |(samples, stretch): (&Vec<f64>, &Stretch)| {
-            let period_s = stretch.drive.period_s();
-            let (a, ratio) = ((-period_s / tau).exp(), tau / period_s);
-            let next = |(before, behind): &mut (f64, f64), v: f64| {
-                let settled = (v - *before) * ratio;
-                *behind = settled + a * (*behind - settled);
-                *before = v;
-                *behind
-            };
-            in_turn(std::slice::from_ref(samples), |first| (first, 0.0), next).concat()
-        };
-        let left = x.iter().zip(&data.stretches).map(behind).collect();
-        Shape::new(format!("{name} - lag({name}, {})", free(tau)), Kind::Lag, left)
-    })
-    .into()
 }
 
 /// A coordinate with a coefficient that drifts, and one that changes during a part of the recording.

@@ -7,6 +7,7 @@ use hysid_plant::{Expr, Simulation, Slot as Place};
 use rayon::prelude::*;
 
 use super::course::Series;
+use super::past;
 use super::shapes::{self, Kind, Shape, held_beyond};
 use super::sites::{Site, Symbol, sites};
 use crate::model::along;
@@ -106,13 +107,16 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
                 found.extend(shapes::linked((x, named(v)), other, named(others.end)));
             }
         }
+        if plant && let (Some(first), Some(x)) = (site.own.first(), series.first()) {
+            found.extend(past::echoes(&first.name, x, data));
+        }
         for (Symbol { name, velocity, .. }, x) in site.own.iter().zip(&series) {
             found.extend(shapes::curves(name, x, *velocity));
             if plant {
                 if !velocity {
                     found.extend(shapes::relays(name, x));
                 }
-                found.extend(shapes::lags(name, x, data));
+                found.extend(past::lags(name, x, data));
                 found.extend(shapes::changes(name, x, data));
             }
             for (u, input) in &inputs {
