@@ -1,11 +1,12 @@
 //! The commands of loops that the simulation closes: what a controller in its equations puts out, as `j - kp*x - kd*v` in
-//! `(ks*x + ki*(j - kp*x - kd*v))/m`. What an actuator leaves out acts on the whole of it, the fed-back part too.
+//! `(ks*x + ki*(j - kp*x - kd*v))/m`. What an actuator leaves out acts on the whole of it, the fed-back part too. The voltage that a controller puts across
+//! a winding is one as well, as `kp*(r - w)` in `(kp*(r - w) - R*i)/L`.
 
 use hysid_plant::{BinaryOp, Expr, Simulation, State};
 
-use super::algebra::only_parameters;
-use super::find::Finder;
-use super::motion::{Kinematic, force_of, kinematic};
+use super::algebra::{constant_coefficient, only_parameters};
+use super::find::{Finder, is_one_of};
+use super::motion::{Kinematic, Motion, force_of, kinematic};
 use super::{Place, Slot, Target};
 
 impl Finder<'_> {
@@ -15,7 +16,8 @@ impl Finder<'_> {
         let mut found: Vec<(Expr, Vec<String>)> = Vec::new();
         for state in known {
             let all = commands_in(self.simulation, &state.derivative);
-            for command in all.into_iter().chain(followed(self.simulation, state)) {
+            let voltage = self.voltage(state).map(|v| v.command);
+            for command in all.into_iter().chain(followed(self.simulation, state)).chain(voltage) {
                 match found.iter_mut().find(|(e, _)| *e == *command) {
                     Some((_, driven)) => driven.push(state.name.clone()),
                     None => found.push((command.clone(), vec![state.name.clone()])),
@@ -30,12 +32,57 @@ impl Finder<'_> {
                 format!("where the command {command} drives {first}"),
                 Target::PartIn(command.clone(), driven.clone()),
             );
+            let current = self.simulation.state(first)?;
+            let across = self.voltage(current).filter(|v| !v.feels && *v.command == command);
             slot.offer(self.simulation, "u", command);
             slot.context = self.derivatives_of(&driven);
+            if let Some(motion) = across.and_then(|_| self.moved_by(current)) {
+                slot.offer(self.simulation, "i", Expr::symbol(first));
+                slot.offer(self.simulation, "v", Expr::symbol(motion.v));
+            }
             Some(slot)
         };
         found.into_iter().filter_map(slot).collect()
     }
+
+    /// The voltage that a controller puts across the winding of which this state is the current: what is left of its balance, from the left, without what the
+    /// winding resists and what it feels of a speed.
+    fn voltage<'e>(&self, state: &'e State) -> Option<Voltage<'e>> {
+        let simulation = self.simulation;
+        if self.moves(&state.name) || !simulation.unit_of(&state.name).is_none_or(|u| is_one_of(&u, &["A"])) {
+            return None;
+        }
+        let is_of = |e: &Expr, name: &str| constant_coefficient(simulation, e, name).is_some();
+        let (mut command, (mut resisted, mut feels)) = (force_of(simulation, &state.derivative).0, (false, false));
+        while let Expr::Binary(BinaryOp::Add | BinaryOp::Sub, rest, last) = command {
+            let (own, speed) = (is_of(last, &state.name), self.motions.iter().any(|m| is_of(last, m.v)));
+            if !own && !speed {
+                break;
+            }
+            (resisted, feels, command) = (resisted || own, feels || speed, rest);
+        }
+        let is_command = resisted && self.moved_by(state).is_some() && closes_a_loop(simulation, command);
+        is_command.then_some(Voltage { command, feels })
+    }
+
+    /// The motion that a current moves.
+    fn moved_by(&self, current: &State) -> Option<&Motion<'_>> {
+        self.motions.iter().find(|m| m.derivative.uses(&current.name))
+    }
+}
+
+/// What a controller puts across a winding.
+struct Voltage<'e> {
+    /// The voltage.
+    command: &'e Expr,
+    /// Whether the winding feels the speed of what it moves besides.
+    feels: bool,
+}
+
+/// Whether an input and fed-back states are in what would be a command.
+fn closes_a_loop(simulation: &Simulation, command: &Expr) -> bool {
+    let drives = simulation.inputs.iter().any(|i| command.uses(&i.symbol));
+    drives && simulation.states.iter().any(|s| command.uses(&s.name))
 }
 
 /// The commands in a derivative: sums of an input and of fed-back states that parameters alone multiply, one term of several in the balance of forces.
@@ -50,6 +97,15 @@ fn commands_in<'e>(simulation: &Simulation, derivative: &'e Expr) -> Vec<&'e Exp
             Expr::Binary(BinaryOp::Mul, a, b) if is_gain(simulation, a) => b,
             Expr::Binary(BinaryOp::Mul, a, b) if is_gain(simulation, b) => a,
             _ => return,
+        };
+        // What a loop inside this one compares with its own state: the current that is asked for, as in `K*(kp*(r - w) + ki*q - i)`.
+        let part = match &**part {
+            Expr::Binary(BinaryOp::Sub, asked, own)
+                if bare(simulation, own) && !asked.terms().iter().any(|(_, e)| bare(simulation, e)) =>
+            {
+                asked
+            }
+            _ => part,
         };
         let inside = |outer: &&Expr| {
             let mut is = false;
@@ -74,10 +130,8 @@ pub(super) fn followed<'e>(simulation: &Simulation, state: &'e State) -> Option<
         _ => return None,
     };
     let Expr::Binary(BinaryOp::Sub, command, own) = &**behind else { return None };
-    let drives = simulation.inputs.iter().any(|i| command.uses(&i.symbol));
-    let feeds_back = simulation.states.iter().any(|s| command.uses(&s.name));
     let follows = **own == Expr::symbol(&state.name) && !command.uses(&state.name);
-    (follows && drives && feeds_back && command.terms().len() > 1).then_some(command)
+    (follows && closes_a_loop(simulation, command) && command.terms().len() > 1).then_some(command)
 }
 
 /// Whether this is a factor that an actuator has, and not the inverse of a mass before the forces themselves.
@@ -86,13 +140,17 @@ fn is_gain(simulation: &Simulation, e: &Expr) -> bool {
     only_parameters(simulation, e) && !inverse
 }
 
+/// Whether this is a state by itself.
+fn bare(simulation: &Simulation, e: &Expr) -> bool {
+    matches!(e, Expr::Symbol(s) if simulation.state(s).is_some())
+}
+
 /// Whether a part of an equation is what a controller puts out. A difference of displacements is what a spring feels, and no command.
 fn is_command(simulation: &Simulation, part: &Expr) -> bool {
     let drives = |e: &Expr| simulation.inputs.iter().any(|i| e.uses(&i.symbol));
     let feeds_back = |e: &Expr| simulation.states.iter().filter(|s| e.uses(&s.name)).count();
     let terms = part.terms();
-    let bare = |e: &Expr| matches!(e, Expr::Symbol(s) if simulation.state(s).is_some());
-    if !drives(part) || feeds_back(part) == 0 || terms.len() < 2 || terms.iter().any(|(_, e)| bare(e)) {
+    if !drives(part) || feeds_back(part) == 0 || terms.len() < 2 || terms.iter().any(|(_, e)| bare(simulation, e)) {
         return false;
     }
     match simulation.unit_of_expr(part) {
@@ -161,6 +219,35 @@ mod tests {
         assert_eq!(found("0.3*(r - psi - 14*w - de)"), whole("r - psi - 14*w"));
         // What reacts upon it is no controller.
         assert_eq!(found("(r - psi - 2*de)/T"), (None, None));
+    }
+
+    /// The slots for commands of a motor's winding with this balance of voltages: what each replaces, and whether a speed could be felt there.
+    fn windings(balance: &str) -> Vec<(String, bool)> {
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\nr = \"asked_rad_s\"\n[parameters]\nL = {{ value = 0.01, min = 0.001, unit = \"H\" }}\n\
+             R = {{ value = 1.0, min = 0.1, unit = \"ohm\" }}\n[states]\nw = {{ derivative = \"(0.05*i - 0.001*w)/0.001\", initial = 0.0, unit = \"rad/s\" }}\n\
+             i = {{ derivative = \"{balance}\", initial = 0.0, unit = \"A\" }}\nq = {{ derivative = \"r - w\", initial = 0.0, unit = \"rad\" }}\n\
+             [outputs]\nspeed_rad_s = \"w\"\n"
+        );
+        let slots = crate::slot::Structure::of(&Simulation::parse(&text, "motor.sim.toml").unwrap()).slots;
+        let commands = slots.iter().filter(|s| s.place == Place::Command);
+        commands.map(|s| (s.quantity("u").unwrap().expression.to_string(), s.has("v") && s.has("i"))).collect()
+    }
+
+    #[test]
+    fn what_a_controller_puts_across_a_winding_is_a_command() {
+        let whole = |command: &str, free: bool| vec![(command.to_owned(), free)];
+        assert_eq!(windings("(0.2*(r - w) + 1.4*q - R*i)/L"), whole("0.2*(r - w) + 1.4*q", true));
+        assert_eq!(windings("(0.2*(r - w) - R*i)/L"), whole("0.2*(r - w)", true));
+        assert_eq!(windings("(0.2*(r - w) + 1.4*q - 0.05*w - R*i)/L"), whole("0.2*(r - w) + 1.4*q", false));
+        // The current that is asked for, and the voltage that a loop around it puts out.
+        let cascaded = windings("(8*(0.2*(r - w) + 1.4*q - i) - R*i)/L");
+        assert_eq!(
+            cascaded,
+            [("0.2*(r - w) + 1.4*q".to_owned(), false), ("8*(0.2*(r - w) + 1.4*q - i)".to_owned(), true)]
+        );
+        // A voltage that is prescribed.
+        assert_eq!(windings("(0.2*r - 0.05*w - R*i)/L"), []);
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
     id: "back_emf",
     family: Family::Electrical,
     block: Block::Input,
-    places: &[Place::Input],
+    places: &[Place::Input, Place::Command],
     applies: |slot| slot.has("v"),
     already: &["lag(u - P*v, Q)"],
     law: |slot, purpose| match purpose {
