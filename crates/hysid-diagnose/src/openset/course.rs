@@ -68,7 +68,7 @@ impl Time {
         self.at.iter().map(|s| s.iter().map(|t| f(*t)).collect()).collect()
     }
 
-    /// The courses of a walk, each for one standard deviation of a walk that ends one away, the two phases of an oscillation, or that of an input.
+    /// The courses of a walk, each for one standard deviation of a walk that ends one away, the two phases of an oscillation, or those of an input.
     pub fn courses(&self, course: &Course) -> Vec<Series> {
         match course {
             Course::Walk(_) => (0..COURSES)
@@ -78,7 +78,7 @@ impl Time {
                 })
                 .collect(),
             Course::Line(f) => vec![self.over(|t| (TAU * f * t).sin()), self.over(|t| (TAU * f * t).cos())],
-            Course::Follows(input) => vec![input.series.clone()],
+            Course::Follows(input) => input.courses.clone(),
         }
     }
 
@@ -92,7 +92,7 @@ impl Time {
                 })
                 .collect(),
             Course::Line(f) => phases(&format!("{:.8}", TAU * f)).to_vec(),
-            Course::Follows(input) => vec![input.text()],
+            Course::Follows(input) => input.texts(),
         }
     }
 

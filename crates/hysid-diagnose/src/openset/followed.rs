@@ -5,16 +5,27 @@ use crate::model::base::Base;
 use crate::slot::{Place, Structure};
 use crate::text::number;
 
-/// An input, or its square, counted from its mean in multiples of its standard deviation.
+/// How a parameter follows an input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// In proportion.
+    Straight,
+    /// As its square.
+    Squared,
+    /// Along a curve of second degree, as a viscosity does a temperature.
+    Curved,
+}
+
+/// An input, its square or both, counted from the mean in multiples of the standard deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Followed {
     /// Its symbol.
     pub symbol: String,
-    squared: bool,
+    way: Way,
     mean: f64,
     deviation: f64,
-    /// The course of a parameter that follows it.
-    pub series: Series,
+    /// The courses of a parameter that follows it, each with an amplitude of its own.
+    pub courses: Vec<Series>,
 }
 
 impl Followed {
@@ -34,14 +45,14 @@ impl Followed {
             .collect();
         let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| !motion.contains(&u.symbol));
         inputs
-            .flat_map(|(i, u)| [false, true].map(|squared| Self::new(base, i, &u.symbol, squared)))
+            .flat_map(|(i, u)| [Way::Straight, Way::Squared, Way::Curved].map(|way| Self::new(base, i, &u.symbol, way)))
             .flatten()
             .collect()
     }
 
     /// `None` where the input does not move.
-    fn new(base: &Base<'_>, input: usize, symbol: &str, squared: bool) -> Option<Self> {
-        let raised = |u: &f64| if squared { u * u } else { *u };
+    fn new(base: &Base<'_>, input: usize, symbol: &str, way: Way) -> Option<Self> {
+        let raised = |u: &f64| if way == Way::Squared { u * u } else { *u };
         let stretches = base.model.data().stretches.iter();
         let mut series: Series = stretches.map(|s| s.drive.inputs()[input].iter().map(raised).collect()).collect();
         let count = series.iter().map(Vec::len).sum::<usize>().max(1) as f64;
@@ -49,22 +60,28 @@ impl Followed {
         let deviation = (series.iter().flatten().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
         series.iter_mut().flatten().for_each(|x| *x = (*x - mean) / deviation);
         let moves = deviation > 1e-9 * mean.abs() && deviation.is_finite();
-        moves.then(|| Self { symbol: symbol.to_owned(), squared, mean, deviation, series })
+        let square = |s: &Vec<f64>| s.iter().map(|x| x * x).collect();
+        let bend = (way == Way::Curved).then(|| series.iter().map(square).collect());
+        let courses = std::iter::once(series).chain(bend).collect();
+        moves.then(|| Self { symbol: symbol.to_owned(), way, mean, deviation, courses })
     }
 
-    /// The course as it is written.
-    pub fn text(&self) -> String {
+    /// The courses as they are written.
+    pub fn texts(&self) -> Vec<String> {
         let Self { symbol, mean, deviation, .. } = self;
-        let power = if self.squared { "^2" } else { "" };
-        format!("({symbol}{power} - {mean})/{deviation}")
+        let power = if self.way == Way::Squared { "^2" } else { "" };
+        let straight = format!("({symbol}{power} - {mean})/{deviation}");
+        let bend = (self.way == Way::Curved).then(|| format!("({straight})^2"));
+        std::iter::once(straight).chain(bend).collect()
     }
 
-    /// What it does to a parameter with this amplitude, in words.
+    /// What it does to a parameter with this amplitude of the first course, in words.
     pub fn words(&self, amplitude: f64) -> String {
         let rises = if amplitude < 0.0 { "falls" } else { "rises" };
-        let of = if self.squared { "the square of " } else { "" };
+        let of = if self.way == Way::Squared { "the square of " } else { "" };
         let share = number(100.0 * (amplitude / self.deviation).abs());
-        format!("{rises} with {of}the input `{}`, by {share} % of its value for each unit of it", self.symbol)
+        let along = if self.way == Way::Curved { " at its mean, along a curve" } else { "" };
+        format!("{rises} with {of}the input `{}`, by {share} % of its value for each unit of it{along}", self.symbol)
     }
 }
 
@@ -72,39 +89,54 @@ impl Followed {
 mod tests {
     use hysid_plant::Simulation;
 
+    use super::Way;
     use crate::budget::Budget;
     use crate::model::Values;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::openset::course::Course;
-    use crate::openset::varying::varying;
+    use crate::openset::varying::{Varying, varying};
     use crate::openset::written::with_course;
     use crate::oscillator::{normal, rms};
 
-    #[test]
-    fn a_coefficient_that_follows_another_input_is_found_with_its_slope() {
+    /// What is found where both coefficients of a force are multiplied by a function of another input, and whether it answers as the truth does where it is
+    /// written.
+    fn follows(factor: impl Fn(f64) -> f64) -> (Varying, bool) {
         let text = "[time]\nperiod_s = 0.1\n[inputs]\nv = \"v_m_s\"\ni = \"coil_A\"\n[parameters]\nf = { value = 1.0, min = 0.1, max = 9.0 }\nc = { value = 1.0, min = 0.1, max = 9.0 }\n\
                     [outputs]\ny_N = \"f*tanh(5*v) + c*v + 0*i\"\n";
         let simulation = Simulation::parse(text, "static.sim.toml").unwrap();
         let mut random = normal(5);
         let v: Vec<f64> = (0..900).map(|_| random()).collect();
         let i: Vec<f64> = (0..900).map(|k| 2.0 + (0.05 * f64::from(k)).sin()).collect();
-        let force = |(v, i): (&f64, &f64)| 3.0 * (1.0 + 0.05 * (i - 2.0)) * (5.0 * v).tanh() + 2.0 * v;
+        let force = |(v, i): (&f64, &f64)| 3.0 * factor(*i) * (5.0 * v).tanh() + 2.0 * v;
         let y = v.iter().zip(&i).map(|at| force(at) + 0.1 * random()).collect();
         let data = recorded(&simulation, 0.1, [("v_m_s", v), ("coil_A", i), ("y_N", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(simulation, &data, NoiseKind::Coloured, &budget);
         let base = none.base;
         let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
+        let written = with_course(&base.document(), &found).unwrap();
+        let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
+        (found, rms(&fit.fit.residual) < 1.05 * 0.1)
+    }
+
+    #[test]
+    fn a_coefficient_that_follows_another_input_is_found_with_its_slope() {
+        let (found, answers) = follows(|i| 1.0 + 0.05 * (i - 2.0));
         let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
         assert_eq!((found.symbol.as_str(), input.symbol.as_str()), ("f", "i"), "{}", found.words());
-        assert!(found.gain > 20.0, "{}", found.gain);
+        assert!(found.gain > 20.0 && answers, "{}", found.gain);
         let slope: f64 = found.amplitudes[0] / 0.5_f64.sqrt();
         assert!((slope - 0.05).abs() < 0.01, "{slope}");
         assert!(found.words().starts_with("the parameter `f` rises with the input `i`, by "), "{}", found.words());
-        // As it is written it answers as the truth does.
-        let written = with_course(&base.document(), &found).unwrap();
-        let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
-        assert!(rms(&fit.fit.residual) < 1.05 * 0.1, "{}", written.to_toml());
+    }
+
+    #[test]
+    fn a_coefficient_may_follow_along_a_curve() {
+        // As a viscosity that falls to half its value over the range.
+        let (found, answers) = follows(|i| (-0.35 * (i - 2.0)).exp());
+        let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
+        assert_eq!((found.symbol.as_str(), input.symbol.as_str(), input.way), ("f", "i", Way::Curved));
+        assert!(answers && found.words().contains("along a curve"), "{}", found.words());
     }
 }

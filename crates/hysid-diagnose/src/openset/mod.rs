@@ -81,14 +81,6 @@ impl OpenSet {
     pub fn gains_by_chance(&self, odds_against: f64) -> f64 {
         gains_by_chance(self.gain, odds_against)
     }
-
-    /// Its terms, where it is made of such.
-    pub fn sparse(&self) -> Option<&Sparse> {
-        match &self.writable {
-            Some(Writable::Sparse(terms)) => Some(terms),
-            _ => None,
-        }
-    }
 }
 
 /// A correction that can be written into a simulation.
@@ -213,7 +205,7 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         record: CorrectionRecord { slot: format!("{place}:{}", found.symbol), terms: records, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),
         gain: found.gain,
-        choice: 0.0,
+        choice: found.choice,
         writable: with_course(&base.document(), &found).map(Writable::Varying),
         words: Some(found.words()),
     }

@@ -58,6 +58,8 @@ pub struct Varying {
     pub left: Whitener,
     /// Log evidence that it adds.
     pub gain: f64,
+    /// What of it is paid for the choice among parameters, lines and inputs.
+    pub choice: f64,
 }
 
 impl Varying {
@@ -143,23 +145,28 @@ fn likely_walks(view: &View<'_>, kind: NoiseKind, of_walks: &[Option<Vec<Vec<f64
     found
 }
 
-/// A parameter that follows an input, with the response to that.
-type Following<'a> = (usize, &'a Followed, Vec<f64>);
+/// A parameter that follows an input, with the responses to its courses.
+type Following<'a> = (usize, &'a Followed, Vec<Vec<f64>>);
 
 /// Every symbol with every input that it may follow.
 fn following<'a>(machine: &Modulated<'_>, symbols: &[String], inputs: &'a [Followed]) -> Vec<Following<'a>> {
     let pairs = inputs.iter().flat_map(|u| (0..symbols.len()).map(move |i| (i, u)));
     let pairs: Vec<(usize, &Followed)> = pairs.filter(|(i, u)| symbols[*i] != u.symbol).collect();
-    let requests: Vec<(usize, Series)> = pairs.iter().map(|(i, u)| (*i, u.series.clone())).collect();
-    pairs.into_iter().zip(machine.responses(&requests)).filter_map(|((i, u), column)| Some((i, u, column?))).collect()
+    let courses = |(i, u): &(usize, &Followed)| u.courses.iter().map(|c| (*i, c.clone())).collect::<Vec<_>>();
+    let requests: Vec<(usize, Series)> = pairs.iter().flat_map(courses).collect();
+    let mut responses = machine.responses(&requests).into_iter();
+    let mut of = |(i, u): (usize, &'a Followed)| {
+        let columns: Vec<Option<Vec<f64>>> = responses.by_ref().take(u.courses.len()).collect();
+        Some((i, u, columns.into_iter().collect::<Option<_>>()?))
+    };
+    pairs.into_iter().filter_map(&mut of).collect()
 }
 
 /// The parameters that explain most under this noise where they follow an input.
 fn likely_to_follow(view: &View<'_>, following: &[Following<'_>]) -> Vec<Candidate> {
-    let one = |(symbol, input, column): &Following<'_>| {
-        let columns = vec![column.clone()];
+    let one = |(symbol, input, columns): &Following<'_>| {
         let course = Course::Follows((*input).clone());
-        Candidate { symbol: *symbol, course, gain: view.free_gain(&columns), columns }
+        Candidate { symbol: *symbol, course, gain: view.free_gain(columns), columns: columns.clone() }
     };
     let mut found: Vec<Candidate> = following.iter().map(one).collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -241,18 +248,13 @@ fn judged(
         let price = kind.price(base.model.count().lasting, Count { lasting, passing: 0 }, data.rows());
         (share * (log_likelihood(data, &left, &after) + spared(data, &left, &base.whitener)), price)
     };
-    let (likelihood, price) = match course {
+    let ((likelihood, price), choice) = match course {
         Course::Walk(_) => {
-            (share * view.log_likelihood(base) + Wander::new(&white, &view.r, share).mean_gain().0, among + SLOW)
+            let gain = Wander::new(&white, &view.r, share).mean_gain().0;
+            ((share * view.log_likelihood(base) + gain, SLOW), among)
         }
-        Course::Line(_) => {
-            let (likelihood, price) = free(2);
-            (likelihood, price + (time.samples().max(2) as f64).ln() + among)
-        }
-        Course::Follows(_) => {
-            let (likelihood, price) = free(1);
-            (likelihood, price + (pairs.max(1) as f64).ln())
-        }
+        Course::Line(_) => (free(2), (time.samples().max(2) as f64).ln() + among),
+        Course::Follows(_) => (free(amplitudes.len()), (pairs.max(1) as f64).ln()),
     };
     let total = norm2(&view.r).max(f64::MIN_POSITIVE);
     let err = white.iter().zip(&amplitudes).map(|(c, a)| a * dot(c, &view.r) / total).collect();
@@ -269,7 +271,8 @@ fn judged(
         amplitudes,
         err,
         length_s: time.length,
-        gain: likelihood - none - price,
+        gain: likelihood - none - price - choice,
+        choice,
         left,
     })
 }

@@ -194,15 +194,19 @@ fn in_place<'d>(
     let explained = best.log_evidence - none.log_evidence;
     let likely =
         |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.gains_by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
-    let refitted = |o: &OpenSet| {
-        let terms = Writable::Sparse(o.sparse()?.within(none.base.document()));
-        if search.setting.budget.omits(Step::Imitation) {
-            return None;
-        }
-        Some((fitted(&search.setting, none, &terms)?, o.clone()))
+    let refitted = |o: &OpenSet, writable: Writable| {
+        let fit = || fitted(&search.setting, none, &writable);
+        let fit = if search.setting.budget.omits(Step::Imitation) { None } else { fit() };
+        Some((fit?, o.clone()))
     };
+    // A parameter that varies beside the set is written into the set's simulation.
+    let beside = |o: &OpenSet| match o.writable.as_ref()? {
+        Writable::Sparse(terms) => refitted(o, Writable::Sparse(terms.within(none.base.document()))),
+        Writable::Varying(_) => None,
+    };
+    let alone = |o: &OpenSet| refitted(o, o.writable.clone()?);
     let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - best.log_evidence - o.choice;
-    let (beside, alone) = (seen.and_then(refitted), generic.filter(likely).and_then(refitted));
+    let (beside, alone) = (seen.and_then(beside), generic.filter(likely).and_then(alone));
     let leads = |swapped: &Option<(Refitted<'d>, OpenSet)>| swapped.as_ref().map(lead).filter(|l| *l > FAR_MORE);
     match (leads(&beside), leads(&alone)) {
         (None, None) => (None, alone.map(|(refitted, _)| refitted)),
