@@ -60,12 +60,20 @@ pub struct Varying {
     pub gain: f64,
     /// What of it is paid for the choice among parameters, lines and inputs.
     pub choice: f64,
+    /// What it would be more if the coefficients that it spares the noise model counted, as they do for a set of effects.
+    spares: f64,
 }
 
 impl Varying {
-    /// The log evidence beside an effect that changes in time too: that what is slow is no noise neither has to show.
+    /// The log evidence beside a set with an effect that changes in time too: that what is slow is no noise neither has to show. What follows an input is
+    /// no noise at all, and what it spares the noise model counts as for an effect; a walk and a line may be a part of the noise that the set leaves.
     pub fn gain_as_a_rival(&self) -> f64 {
-        self.gain + if matches!(self.course, Course::Walk(_)) { SLOW } else { 0.0 }
+        self.gain
+            + match self.course {
+                Course::Walk(_) => SLOW,
+                Course::Line(_) => 0.0,
+                Course::Follows(_) => self.spares,
+            }
     }
 
     /// In words.
@@ -256,6 +264,7 @@ fn judged(
         Course::Line(_) => (free(2), (time.samples().max(2) as f64).ln() + among),
         Course::Follows(_) => (free(amplitudes.len()), (pairs.max(1) as f64).ln()),
     };
+    let credited = |noise: &Whitener| share * spared(data, noise, &base.whitener);
     let total = norm2(&view.r).max(f64::MIN_POSITIVE);
     let err = white.iter().zip(&amplitudes).map(|(c, a)| a * dot(c, &view.r) / total).collect();
     let symbol = symbols.get(symbol)?.clone();
@@ -273,6 +282,7 @@ fn judged(
         length_s: time.length,
         gain: likelihood - none - price - choice,
         choice,
+        spares: credited(&base.whitener) - credited(&left),
         left,
     })
 }
