@@ -30,7 +30,7 @@ pub fn lags(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
 }
 
 /// Delays of a coordinate over the mean period of its motion: as finely as it tells them apart, and over a few periods.
-const ECHOES: (usize, f64) = (24, 0.125);
+const ECHOES: (usize, f64) = (16, 1.0 / 6.0);
 
 /// A coordinate as it was some time ago, as a tool feels the cut of the turn before and a controller what came late over a network.
 pub fn echoes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
