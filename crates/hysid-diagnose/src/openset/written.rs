@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use hysid_plant::{BinaryOp, Expr, Function, Parameter, Simulation, Slot as Place};
+use hysid_plant::{BinaryOp, Expr, Function, Memory, Parameter, Simulation, Slot as Place};
 
 use super::course::{Course, phases};
 use super::modulation::multiply;
@@ -145,12 +145,15 @@ pub fn with_terms<'t>(
 }
 
 /// What is held at the ends of the range that was seen of it. Beyond that a curve says nothing: there it stays as it is, and with it what it balances within,
-/// and what a product multiplies it with. Proportions and waves go on.
+/// and what a product multiplies it with. Proportions and waves go on, and what was some time ago, which balances nothing within.
 fn held<'t>(terms: &[(&'t Term, f64)]) -> Option<Vec<&'t Expr>> {
     // The coordinates that grow in each term, with the degree at which they do.
     let mut growing: Vec<Vec<(&Expr, usize)>> = Vec::new();
     for (term, _) in terms {
         let text = Expr::parse(&term.text).ok()?;
+        if is_past(&text) {
+            continue;
+        }
         let of = |c: &'t Coordinate| (&c.meaning, degree(&text, &c.name));
         growing.push(term.coordinates.iter().map(of).filter(|(_, degree)| *degree > 0).collect());
     }
@@ -164,6 +167,11 @@ fn held<'t>(terms: &[(&'t Term, f64)]) -> Option<Vec<&'t Expr>> {
         }
         held.extend(more);
     }
+}
+
+/// Whether a term is a coordinate as it was some time ago.
+fn is_past(text: &Expr) -> bool {
+    matches!(text, Expr::Memory(Memory::Delay, _))
 }
 
 /// Share of a cycle over the recording by which a frequency may move from where the periodogram found it.
@@ -199,6 +207,7 @@ pub fn with_course(simulation: &Simulation, found: &Varying) -> Option<Simulatio
 /// `curves`: coordinates that are held at the ends of what was seen of them.
 fn with_free_shapes(simulation: &mut Simulation, term: &Term, curves: &[&Expr]) -> Option<Expr> {
     let parsed = Expr::parse(&term.text).ok()?;
+    let curves = if is_past(&parsed) { &[] } else { curves };
     let free = with_shapes(parsed, &mut |n| {
         let name = simulation.fresh_symbol("s");
         let (low, high) = (n * SHAPES.0, n * SHAPES.1);
@@ -275,6 +284,20 @@ mod tests {
         assert_eq!(held_in(&["x^2", "y"]), "x");
         assert_eq!(held_in(&["u*x", "x^2", "y"]), "u x");
         assert_eq!(held_in(&["u*y", "x^2", "u*x"]), "u x y");
+    }
+
+    /// A curve is held beyond the range, and not what came late beside it.
+    #[test]
+    fn what_was_some_time_ago_is_not_held() {
+        let plain = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let mut both = [term("delay(x, 0.31)", &["x", "v"]), term("x^2*v", &["x", "v"])];
+        for term in &mut both {
+            let held = |c: &Coordinate| Coordinate { held: Expr::symbol(format!("held_{}", c.name)), ..c.clone() };
+            term.coordinates = term.coordinates.iter().map(held).collect();
+        }
+        let (written, _) = with_terms(&plain, both.iter().map(|t| (t, 1.0))).unwrap();
+        let text = written.states[1].derivative.to_string();
+        assert!(text.contains("delay(x, s)") && text.contains("held_x^2*held_v"), "{text}");
     }
 
     fn term(text: &str, coordinates: &[&str]) -> Term {
