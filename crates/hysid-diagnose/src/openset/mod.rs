@@ -317,28 +317,39 @@ mod tests {
         assert!(nothing.is_none_or(|o| o.by_chance(ODDS_AGAINST) > 0.1));
     }
 
+    /// What is said to be missing in a simulation, where a state of the truth has another derivative and the one output a noise of this share.
+    fn seen(
+        text: &str,
+        (state, derivative): (&str, &str),
+        (input, u): (&str, Vec<f64>),
+        output: &str,
+        (noise, random): (f64, &mut dyn FnMut() -> f64),
+    ) -> OpenSet {
+        let original = Simulation::parse(text, "test.sim.toml").unwrap();
+        let mut truth = original.clone();
+        truth.state_mut(state).unwrap().derivative = hysid_plant::Expr::parse(derivative).unwrap();
+        let compiled = Compiled::new(&truth).unwrap();
+        let run = Drive::new(0.0, PERIOD, u.len(), vec![u.clone()]).unwrap();
+        let mut y = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs.swap_remove(0);
+        let noise = noise * rms(&y);
+        y.iter_mut().for_each(|y| *y += noise * random());
+        let data = recorded(&original, PERIOD, [(input, u), (output, y)]);
+        let budget = Budget::new(&|_| false);
+        let (_, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        correction(&none.base, NoiseKind::White(1.0)).unwrap()
+    }
+
     /// A fin that turns no faster than its drive can: the equation of the fin has no slot of the catalogue.
     #[test]
     fn a_rate_that_is_limited_is_seen() {
         let text = "[time]\nperiod_s = 0.02\n[inputs]\ndc = \"command_deg\"\n[parameters]\nta = { value = 0.06, min = 0.01, max = 0.6, unit = \"s\" }\n\
                     tr = { value = 0.4, min = 0.1, max = 2.0, unit = \"s\" }\n[states]\nfin = { derivative = \"(dc - fin)/ta\", initial = 0.0, unit = \"deg\" }\n\
                     p = { derivative = \"(3*fin - p)/tr\", initial = 0.0, unit = \"deg/s\" }\n[outputs]\nroll_deg_s = \"p\"\n";
-        let original = Simulation::parse(text, "fin.sim.toml").unwrap();
-        let mut truth = original.clone();
-        let limited = hysid_plant::Expr::parse("max(min((dc - fin)/ta, 40), -40)").unwrap();
-        truth.state_mut("fin").unwrap().derivative = limited;
         let mut random = normal(4);
         let steps: Vec<f64> = (0..30).map(|_| 4.0 * random()).collect();
         let dc: Vec<f64> = (0..1500).map(|n| steps[n / 50]).collect();
-        let compiled = Compiled::new(&truth).unwrap();
-        let run = Drive::new(0.0, PERIOD, dc.len(), vec![dc.clone()]).unwrap();
-        let mut roll = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs.swap_remove(0);
-        let noise = 0.005 * rms(&roll);
-        roll.iter_mut().for_each(|y| *y += noise * random());
-        let data = recorded(&original, PERIOD, [("command_deg", dc), ("roll_deg_s", roll)]);
-        let budget = Budget::new(&|_| false);
-        let (_, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
-        let found = correction(&none.base, NoiseKind::White(1.0)).unwrap();
+        let limited = ("fin", "max(min((dc - fin)/ta, 40), -40)");
+        let found = seen(text, limited, ("command_deg", dc), "roll_deg_s", (0.005, &mut random));
         let first = &found.record.terms[0];
         assert_eq!(found.record.slot, "state:fin", "{:?}", found.record.terms);
         assert!(first.term.starts_with("max(rate_fin") && first.coefficient < -0.3, "{first:?}");
@@ -351,21 +362,10 @@ mod tests {
                     c = { value = 2.0, min = 0.5, max = 8.0, unit = \"N s/m\" }\nk = { value = 80.0, min = 30.0, max = 200.0, unit = \"N/m\" }\n[states]\n\
                     x = { derivative = \"v\", initial = 0.0, unit = \"m\" }\nv = { derivative = \"(u - c*v - k*x)/m\", initial = 0.0, unit = \"m/s\" }\n\
                     [outputs]\ny_m = \"x\"\n";
-        let original = Simulation::parse(text, "tool.sim.toml").unwrap();
-        let mut truth = original.clone();
-        truth.state_mut("v").unwrap().derivative =
-            hysid_plant::Expr::parse("(u - c*v - k*x - 12*delay(x, 0.37))/m").unwrap();
         let mut random = normal(6);
         let u = drive(1500, &mut random);
-        let compiled = Compiled::new(&truth).unwrap();
-        let run = Drive::new(0.0, PERIOD, u.len(), vec![u.clone()]).unwrap();
-        let mut y = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs.swap_remove(0);
-        let noise = 0.01 * rms(&y);
-        y.iter_mut().for_each(|y| *y += noise * random());
-        let data = recorded(&original, PERIOD, [("force_N", u), ("y_m", y)]);
-        let budget = Budget::new(&|_| false);
-        let (_, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
-        let found = correction(&none.base, NoiseKind::White(1.0)).unwrap();
+        let late = ("v", "(u - c*v - k*x - 12*delay(x, 0.37))/m");
+        let found = seen(text, late, ("force_N", u), "y_m", (0.01, &mut random));
         let first = &found.record.terms[0];
         let late = first.term.strip_prefix("delay(x, ").and_then(|t| t.strip_suffix(')'));
         let late: f64 = late.unwrap_or_else(|| panic!("{:?}", found.record.terms)).parse().unwrap();

@@ -5,7 +5,7 @@
 use hysid_plant::{BinaryOp, Expr, Simulation, State};
 
 use super::algebra::{constant_coefficient, only_parameters};
-use super::find::{Finder, is_one_of};
+use super::find::Finder;
 use super::motion::{Kinematic, Motion, force_of, kinematic};
 use super::{Place, Slot, Target};
 
@@ -32,11 +32,10 @@ impl Finder<'_> {
                 format!("where the command {command} drives {first}"),
                 Target::PartIn(command.clone(), driven.clone()),
             );
-            let current = self.simulation.state(first)?;
-            let across = self.voltage(current).filter(|v| !v.feels && *v.command == command);
+            let across = self.voltage(self.simulation.state(first)?).filter(|v| *v.command == command);
             slot.offer(self.simulation, "u", command);
             slot.context = self.derivatives_of(&driven);
-            if let Some(motion) = across.and_then(|_| self.moved_by(current)) {
+            if let Some(motion) = across.and_then(|v| v.unfelt) {
                 slot.offer(self.simulation, "i", Expr::symbol(first));
                 slot.offer(self.simulation, "v", Expr::symbol(motion.v));
             }
@@ -47,11 +46,12 @@ impl Finder<'_> {
 
     /// The voltage that a controller puts across the winding of which this state is the current: what is left of its balance, from the left, without what the
     /// winding resists and what it feels of a speed.
-    fn voltage<'e>(&self, state: &'e State) -> Option<Voltage<'e>> {
+    fn voltage<'e>(&'e self, state: &'e State) -> Option<Voltage<'e>> {
         let simulation = self.simulation;
-        if self.moves(&state.name) || !simulation.unit_of(&state.name).is_none_or(|u| is_one_of(&u, &["A"])) {
+        if !self.is_current(state) {
             return None;
         }
+        let motion = self.motions.iter().find(|m| m.derivative.uses(&state.name))?;
         let is_of = |e: &Expr, name: &str| constant_coefficient(simulation, e, name).is_some();
         let (mut command, (mut resisted, mut feels)) = (force_of(simulation, &state.derivative).0, (false, false));
         while let Expr::Binary(BinaryOp::Add | BinaryOp::Sub, rest, last) = command {
@@ -61,13 +61,8 @@ impl Finder<'_> {
             }
             (resisted, feels, command) = (resisted || own, feels || speed, rest);
         }
-        let is_command = resisted && self.moved_by(state).is_some() && closes_a_loop(simulation, command);
-        is_command.then_some(Voltage { command, feels })
-    }
-
-    /// The motion that a current moves.
-    fn moved_by(&self, current: &State) -> Option<&Motion<'_>> {
-        self.motions.iter().find(|m| m.derivative.uses(&current.name))
+        let unfelt = (!feels).then_some(motion);
+        (resisted && closes_a_loop(simulation, command)).then_some(Voltage { command, unfelt })
     }
 }
 
@@ -75,8 +70,8 @@ impl Finder<'_> {
 struct Voltage<'e> {
     /// The voltage.
     command: &'e Expr,
-    /// Whether the winding feels the speed of what it moves besides.
-    feels: bool,
+    /// What the winding moves, where it does not feel the speed of that.
+    unfelt: Option<&'e Motion<'e>>,
 }
 
 /// Whether an input and fed-back states are in what would be a command.
@@ -147,15 +142,13 @@ fn bare(simulation: &Simulation, e: &Expr) -> bool {
 
 /// Whether a part of an equation is what a controller puts out. A difference of displacements is what a spring feels, and no command.
 fn is_command(simulation: &Simulation, part: &Expr) -> bool {
-    let drives = |e: &Expr| simulation.inputs.iter().any(|i| e.uses(&i.symbol));
-    let feeds_back = |e: &Expr| simulation.states.iter().filter(|s| e.uses(&s.name)).count();
     let terms = part.terms();
-    if !drives(part) || feeds_back(part) == 0 || terms.len() < 2 || terms.iter().any(|(_, e)| bare(simulation, e)) {
+    if !closes_a_loop(simulation, part) || terms.len() < 2 || terms.iter().any(|(_, e)| bare(simulation, e)) {
         return false;
     }
     match simulation.unit_of_expr(part) {
         Some(unit) => kinematic(Some(&unit), "") == Kinematic::Neither,
-        None => feeds_back(part) > 1,
+        None => simulation.states.iter().filter(|s| part.uses(&s.name)).count() > 1,
     }
 }
 

@@ -201,10 +201,14 @@ impl Finder<'_> {
 
     /// The current of a winding that an input drives, and the motion that it moves; `None` where the winding feels the speed already.
     fn winding(&self, input: &str) -> Option<(&str, &Motion<'_>)> {
-        let current = |s: &&State| self.simulation.unit_of(&s.name).is_none_or(|u| is_one_of(&u, &["A"]));
-        let driven = self.simulation.states.iter().filter(|s| s.derivative.uses(input) && !self.moves(&s.name));
+        let mut driven = self.simulation.states.iter().filter(|s| s.derivative.uses(input) && self.is_current(s));
         let moved = |s: &State| self.motions.iter().find(|m| m.derivative.uses(&s.name) && !s.derivative.uses(m.v));
-        driven.filter(current).find_map(|s| Some((s.name.as_str(), moved(s)?)))
+        driven.find_map(|s| Some((s.name.as_str(), moved(s)?)))
+    }
+
+    /// Whether a state may be a current: one that does not move, in amperes where its unit is known.
+    pub(super) fn is_current(&self, state: &State) -> bool {
+        !self.moves(&state.name) && self.simulation.unit_of(&state.name).is_none_or(|u| is_one_of(&u, &["A"]))
     }
 
     /// A measured quantity has the unit that its column's name ends in.

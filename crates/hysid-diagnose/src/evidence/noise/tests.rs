@@ -11,23 +11,18 @@ fn white(n: usize, seed: u64) -> Vec<f64> {
     (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
 }
 
-/// Noise whose power goes as this power of one over frequency, by shaping the lines of white noise; a quarter of what it was made of, so that its end and its
-/// beginning are no neighbours.
-fn falling(n: usize, exponent: f64, seed: u64) -> Vec<f64> {
+/// Noise whose power goes as one over frequency, by shaping the lines of white noise; a quarter of what it was made of, so that its end and its beginning are
+/// no neighbours.
+fn pink(n: usize, seed: u64) -> Vec<f64> {
     let whole = 4 * n;
     let mut lines = fourier(&white(whole, seed));
     for (k, l) in lines.iter_mut().enumerate() {
-        let a = (k.max(1) as f64 / whole as f64).powf(-0.5 * exponent);
+        let a = (k.max(1) as f64 / whole as f64).powf(-0.5);
         *l = (l.0 * a, l.1 * a);
     }
     let mut e = inverse_fourier(&lines, whole);
     e.truncate(n);
     e
-}
-
-/// Noise whose power goes as one over frequency.
-fn pink(n: usize, seed: u64) -> Vec<f64> {
-    falling(n, 1.0, seed)
 }
 
 /// Power of the lowest lines of a whitened series over that of all.
