@@ -194,10 +194,13 @@ impl Display for Unit {
 }
 
 impl Unit {
-    /// The unit that a column's name ends in: `force_N` gives `N`, `v_mm_s` gives `mm/s`, `inflow_m3_s` gives `m^3/s`, `conc_mol_L` gives `mol/L`;
-    /// nothing where the end is not known or may be read in two ways (`torque_N_m`, `H_A_m`).
+    /// The unit that a column's name ends in: `force_N` gives `N`, `v_mm_s` gives `mm/s`, `inflow_m3_s` gives `m^3/s`, `conc_mol_L` gives `mol/L`,
+    /// `H_A_per_m` gives `A/m`; nothing where the end is not known or may be read in two ways (`torque_N_m`, `H_A_m`).
     pub fn of_column(column: &str) -> Option<Self> {
         let parts: Vec<&str> = column.split('_').skip(1).collect();
+        if let Some(per) = parts.iter().rposition(|p| *p == "per") {
+            return Self::of_quotient(&parts[..per], &parts[per + 1..]);
+        }
         let (&last, before) = parts.split_last()?;
         let quotient = |(above, power): (&str, i32), (below, per): (&str, i32)| Self {
             factors: vec![(above.to_owned(), ONE * power), (below.to_owned(), -ONE * per)],
@@ -223,6 +226,17 @@ impl Unit {
         }
         // `x_m2` is more likely the place of a second mass than an area.
         exponents(last).map(|_| Self { factors: vec![(last.to_owned(), ONE)] })
+    }
+
+    /// The units that the one list ends in over all of the other; `None` where any of these is not known.
+    fn of_quotient(above: &[&str], below: &[&str]) -> Option<Self> {
+        let above: Vec<(&str, i32)> = above.iter().rev().map_while(|name| powered(name)).collect();
+        let below: Vec<(&str, i32)> = below.iter().map(|name| powered(name)).collect::<Option<_>>()?;
+        let side = |list: &[(&str, i32)], sign: i32| -> Vec<(String, i32)> {
+            list.iter().map(|(name, power)| ((*name).to_owned(), sign * ONE * power)).collect()
+        };
+        let factors = [side(&above.iter().rev().copied().collect::<Vec<_>>(), 1), side(&below, -1)].concat();
+        (!above.is_empty() && !below.is_empty()).then_some(Self { factors })
     }
 }
 
