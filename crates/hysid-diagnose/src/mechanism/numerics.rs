@@ -41,6 +41,9 @@ const STICKS: &str = "friction that sticks in the place of a smoothed law";
 /// A smoothed friction law made sharper, which can be done again.
 pub const SHARPER: &str = "smoothed friction three times as sharp";
 
+/// Euler's explicit method in the place of the equations.
+const EXPLICIT: &str = "explicit steps of a sampling period, as a machine that is emulated takes them";
+
 /// The variants of a simulation whose outputs are to be compared with its own.
 ///
 /// `period_s` is the recording's sampling period. Outputs that come half a sample late are made with `delay`; shorter integration steps are no
@@ -64,6 +67,7 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
     if late.validate().is_ok() {
         found.push(Variant { what: "outputs half a sample late", simulation: late });
     }
+    found.extend(explicit(simulation, period_s).map(|simulation| Variant { what: EXPLICIT, simulation }));
     let slots = Structure::of(simulation).slots;
     let sharpened = |sticks: bool| {
         let mut other = simulation.clone();
@@ -90,6 +94,32 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
     found
 }
 
+/// The differential equation that explicit steps of this length follow but for terms of their square, `x' = f(x - h/2 f(x, u), u)` with held inputs; `None`
+/// where there is no state, or a memory that knows nothing of steps.
+///
+/// Reference: E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed. (2006), sec. IX.1 (modified equations).
+fn explicit(simulation: &Simulation, step_s: f64) -> Option<Simulation> {
+    let remembers = simulation.states.iter().any(|s| {
+        let mut found = false;
+        s.derivative.visit(&mut |e| found |= matches!(e, Expr::Memory(..)));
+        found
+    });
+    if simulation.is_static() || remembers {
+        return None;
+    }
+    let earlier = |e: Expr| match &e {
+        Expr::Symbol(name) => match simulation.state(name) {
+            Some(state) => e - Expr::Number(step_s / 2.0) * state.derivative.clone(),
+            None => e,
+        },
+        _ => e,
+    };
+    let mut other = simulation.clone();
+    other.time.hold = Hold::Zero;
+    other.states.iter_mut().for_each(|s| s.derivative = s.derivative.map(&mut |e| earlier(e)));
+    other.validate().is_ok().then_some(other)
+}
+
 fn uses_state(simulation: &Simulation, arguments: &[Expr]) -> bool {
     arguments.iter().any(|a| !contains_memory(a) && simulation.states.iter().any(|s| a.uses(&s.name)))
 }
@@ -98,4 +128,36 @@ fn contains_memory(expr: &Expr) -> bool {
     let mut found = false;
     expr.visit(&mut |e| found |= matches!(e, Expr::Memory(Memory::Lag | Memory::Delay, _)));
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::{Compiled, Drive, Run};
+
+    use super::*;
+
+    /// A pendulum under a torque in steps, emulated by Euler's method, against its equations and against the variant.
+    #[test]
+    fn what_explicit_steps_do_is_followed_but_for_a_tenth() {
+        let (h, n) = (0.01, 2000);
+        let text = "[time]\nperiod_s = 0.01\nhold = \"zero\"\n[inputs]\nu = \"u_Nm\"\n[parameters]\nb = { value = 0.4, min = 0.0 }\n[states]\n\
+                    q = { derivative = \"w\", initial = 0.0 }\nw = { derivative = \"u - 9*sin(q) - b*w\", initial = 0.0 }\n[outputs]\nq_rad = \"q\"\n";
+        let simulation = Simulation::parse(text, "pendulum.sim.toml").unwrap();
+        let u: Vec<f64> = (0..n).map(|i| if (i / 150) % 2 == 0 { 3.0 } else { -2.0 }).collect();
+        let (mut q, mut w) = (0.0_f64, 0.0_f64);
+        let emulated = u.iter().map(|u| {
+            let now = q;
+            (q, w) = (q + h * w, w + h * (u - 9.0 * q.sin() - 0.4 * w));
+            now
+        });
+        let emulated: Vec<f64> = emulated.collect();
+        let off = |simulation: &Simulation| {
+            let compiled = Compiled::new(simulation).unwrap();
+            let drive = Drive::new(0.0, h, n, vec![u.clone()]).unwrap();
+            let run = compiled.simulate(&Run::new(&drive, &compiled.theta()));
+            run.outputs[0].iter().zip(&emulated).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+        };
+        let variant = explicit(&simulation, h).unwrap();
+        assert!(off(&variant) < 0.1 * off(&simulation), "{} {}", off(&variant), off(&simulation));
+    }
 }
