@@ -63,6 +63,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         original: simulation.clone(),
         pushed: pushed(simulation),
         substeps: 2,
+        rounded: Vec::new(),
         own_unknowns: Count::default(),
         iterations: 12,
         noise: NoiseKind::Coloured,

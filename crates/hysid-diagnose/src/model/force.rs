@@ -49,6 +49,23 @@ pub fn force_paths(model: &Model<'_>, theta: &[f64], pushed: &[String]) -> Vec<V
         .collect()
 }
 
+/// Whether the simulation forgets by itself where it was, all along the recording: each state falls back at any moment, and none answers, by way of
+/// others, to itself. Two that begin apart come together then, whatever drives them, as levels and temperatures do; a force that nobody recorded never
+/// parts such a simulation from its machine. (Slotine and Lohmiller, Automatica 34 (1998) 683: hierarchies of contracting systems contract.)
+pub fn forgets(model: &Model<'_>, theta: &[f64]) -> bool {
+    let n = model.simulation().states.len();
+    let points = model.linearised(theta, INSTANTS);
+    let falls_back = |i: usize| points.iter().all(|p| p.a[i * n + i] < 0.0);
+    let mut left: Vec<usize> = (0..n).collect();
+    while let Some(place) = left.iter().position(|&i| {
+        let answers = |&j: &usize| j != i && points.iter().any(|p| p.a[i * n + j] != 0.0);
+        falls_back(i) && !left.iter().any(answers)
+    }) {
+        left.remove(place);
+    }
+    !points.is_empty() && left.is_empty()
+}
+
 /// The mean of the middle half.
 fn middle(values: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = values.filter(|x| x.is_finite()).collect();
@@ -65,19 +82,33 @@ mod tests {
     use crate::model::Values;
     use hysid_plant::Drive;
 
-    /// A drive with dry friction that is pushed to and fro, sticking for part of the time; the state of a loop where there is one.
-    fn paths(force: &str) -> Vec<Vec<ForcePath>> {
+    /// What is asked of states with these derivatives and initial values, the first of them recorded, under an input that goes to and fro around a mean.
+    fn asked<T>(states: &[(&str, &str, f64)], mean: f64, ask: impl Fn(&Model<'_>, &[f64]) -> T) -> T {
+        let list: String = (states.iter())
+            .map(|(name, derivative, initial)| {
+                format!("{name} = {{ derivative = \"{derivative}\", initial = {initial:?} }}\n")
+            })
+            .collect();
+        let seen = states[0].0;
         let text = format!(
-            "[time]\nperiod_s = 0.05\n[inputs]\nu = \"u_Nm\"\n[parameters]\nb = {{ value = 0.5, min = 0.0 }}\n[states]\nq = {{ derivative = \"w\", initial = 0.0 }}\nw = {{ derivative = \"({force})/2\", initial = 0.0 }}\n[outputs]\nq_rad = \"q\"\n"
+            "[time]\nperiod_s = 0.05\n[inputs]\nu = \"u_Nm\"\n[parameters]\nb = {{ value = 0.5, min = 0.0 }}\n[states]\n{list}[outputs]\nq_rad = \"{seen}\"\n"
         );
         let simulation = Simulation::parse(&text, "drive.sim.toml").unwrap();
-        let u: Vec<f64> = (0..600).map(|n| 3.0 * (n as f64 * 0.07).sin()).collect();
+        let u: Vec<f64> = (0..600).map(|n| mean + 3.0 * (n as f64 * 0.07).sin()).collect();
         let drive = Drive::new(0.0, 0.05, u.len(), vec![u.clone()]).unwrap();
         let data = DataSet::of_drive(drive, vec![vec![0.0; u.len()]], 0.05);
         let model = Model::new(&simulation, &data, 2).unwrap();
-        let names = pushed(&simulation);
-        assert_eq!(names, ["w"]);
-        force_paths(&model, &model.theta(&Values::default()), &names)
+        ask(&model, &model.theta(&Values::default()))
+    }
+
+    /// Of a drive with dry friction that is pushed to and fro, sticking for part of the time; the state of a loop where there is one.
+    fn paths(force: &str) -> Vec<Vec<ForcePath>> {
+        let states = [("q", "w", 0.0), ("w", &*format!("({force})/2"), 0.0)];
+        asked(&states, 0.0, |model, theta| {
+            let names = pushed(model.simulation());
+            assert_eq!(names, ["w"]);
+            force_paths(model, theta, &names)
+        })
     }
 
     fn by_hand(stiffness: f64) -> Vec<Vec<ForcePath>> {
@@ -92,6 +123,18 @@ mod tests {
     #[test]
     fn a_loop_in_the_simulation_is_closed() {
         assert_eq!(paths("8*(u - q) - b*w"), by_hand(4.0));
+    }
+
+    #[test]
+    fn what_is_stored_forgets_and_what_swings_sticks_or_adds_up_does_not() {
+        let forgets = |states: &[(&str, &str, f64)]| asked(states, 4.0, forgets);
+        assert!(forgets(&[("h", "u - 2*sqrt(h)", 2.0)]));
+        // One tank into the next, in whatever order they are written.
+        assert!(forgets(&[("g", "2*sqrt(h) - b*g*g", 2.0), ("h", "u - 2*sqrt(h)", 2.0)]));
+        assert!(!forgets(&[("g", "2*sqrt(h) - b*g*g", 2.0), ("h", "u - 2*sqrt(h) - 0.1*g", 2.0)]), "a loop");
+        assert!(!forgets(&[("q", "w", 0.0), ("w", "u - b*w - sign(w)", 0.0)]), "a position adds up");
+        assert!(!forgets(&[("q", "w", 0.0), ("w", "u - b*w - 4*q^3", 0.0)]), "a spring");
+        assert!(!forgets(&[("h", "u - 4 - 0.3*h^3 + 0.9*h", 0.1)]), "two places of rest");
     }
 
     #[test]

@@ -161,6 +161,8 @@ pub struct Setting<'d> {
     pub pushed: Vec<String>,
     /// Integration steps in each period.
     pub substeps: usize,
+    /// Labels of the outputs of which the recorded values lie on the steps of a fine converter, where its rounding is much of what is left.
+    pub rounded: Vec<String>,
     /// Number of unknowns of the simulation without effects.
     pub own_unknowns: Count,
     /// Iterations of a refit on the short list.
@@ -243,6 +245,7 @@ pub fn calibrated<'d>(
         pushed: crate::model::force::pushed(&original),
         original,
         substeps: 2,
+        rounded: Vec::new(),
         own_unknowns: Count::default(),
         iterations: 12,
         noise,

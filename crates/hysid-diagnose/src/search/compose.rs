@@ -32,6 +32,8 @@ pub struct Ask<'a, 'd> {
     pub around: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
     /// Effects that its noise model may have taken for noise.
     pub absorbed: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
+    /// The hypothesis under white noise, with what could be missing around it there; `None` where its noise is white.
+    pub plainly: &'a dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)>,
 }
 
 /// Log evidence that another effect must add.
@@ -45,18 +47,18 @@ const ROUNDS: usize = 4;
 /// Log evidence by which the second best set may trail and still have its members' rivals heard.
 const NEARLY: f64 = 6.0;
 
-/// Pairs of candidates of the simulation without effects, fitted together.
+/// A hypothesis with pairs of what could be missing around it, each fitted together.
 pub fn superposed<'d>(
     setting: &Setting<'d>,
-    none: &Hypothesis<'d>,
+    parent: &Hypothesis<'d>,
     candidates: &[Candidate],
     most: usize,
 ) -> Vec<Hypothesis<'d>> {
     if setting.budget.omits(Step::Fits) {
         return Vec::new();
     }
-    let (_, r) = none.base.evidence();
-    let own = none.base.values();
+    let (_, r) = parent.base.evidence();
+    let own = parent.base.values();
     let mut sketched: Vec<Hypothesis<'d>> = pairs(candidates, &r, PAIRS.0)
         .par_iter()
         .filter_map(|pair| {
@@ -65,7 +67,7 @@ pub fn superposed<'d>(
             }
             let parts =
                 [0, 1].map(|i| Part::of_candidate(&candidates[pair.members[i]], pair.points[i], &pair.amplitudes[i]));
-            assemble(setting, none, &own, &parts, &none.base.whitener, 5)
+            assemble(setting, parent, &own, &parts, &parent.base.whitener, 5)
         })
         .collect();
     sketched.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
@@ -101,7 +103,7 @@ pub fn compose<'d>(
     options: SearchOptions,
     ask: &Ask<'_, 'd>,
 ) {
-    let Ask { unexplained, around, absorbed } = ask;
+    let Ask { unexplained, around, absorbed, .. } = ask;
     let enough = || setting.budget.omits(Step::Composition);
     for depth in 2..=options.depth {
         if enough() {
@@ -137,6 +139,9 @@ pub fn compose<'d>(
         }
         let reached = reached.max(recast(setting, none, pool, depth));
         if reached < best + LEAST_GAIN {
+            let stands = best_below(pool, depth).filter(|_| more && depth < options.depth && !enough());
+            let together = stands.map(|s| two_at_once(setting, &pool[s], options, ask));
+            together.into_iter().flatten().for_each(|h| add(pool, h));
             break;
         }
     }
@@ -182,6 +187,21 @@ pub fn compose<'d>(
             break;
         }
     }
+}
+
+/// What stands with two more effects at once: two that nearly cancel each other add nothing one after the other, and of two that are slow a coloured noise
+/// model takes for noise what either leaves.
+fn two_at_once<'d>(
+    setting: &Setting<'d>,
+    stands: &Hypothesis<'d>,
+    options: SearchOptions,
+    ask: &Ask<'_, 'd>,
+) -> Vec<Hypothesis<'d>> {
+    let mut found = superposed(setting, stands, &(ask.around)(stands), options.most);
+    if let Some((plain, candidates)) = (ask.plainly)(stands) {
+        found.extend(superposed(setting, &plain, &candidates, options.most));
+    }
+    found
 }
 
 /// Adds what comes of the second best set of so many effects, where it is nearly as likely as the best, by putting in the place of each member what

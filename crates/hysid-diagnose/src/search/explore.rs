@@ -3,6 +3,7 @@
 use super::Search;
 use super::compose::{add, best_of};
 use super::detectable::detectability;
+use super::rounding::rounded;
 use super::screen::{Candidate, screen};
 use super::tracked;
 use crate::budget::Step;
@@ -11,6 +12,7 @@ use crate::calibration::lesson::{Done, Lesson, lesson};
 use crate::evidence::correlation_time;
 use crate::file::DetectableRecord;
 use crate::model::base::{Base, NoiseKind};
+use crate::model::force::forgets;
 use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::request::{Hooks, Request, words};
 use crate::slot::is_linear;
@@ -93,11 +95,12 @@ pub fn explore<'a, 'd>(
     };
     let options = request.options;
     let mut notes = Vec::new();
+    let setting = &Setting { rounded: rounded(setting, &base), ..setting.clone() };
     let none = setting.hypothesis(Vec::new(), base);
 
     (hooks.progress)("looking for what could be missing");
     let evidence = none.base.evidence();
-    let mut candidates = screen(&none.base, &setting.original, &[], &evidence, &|_, _| true);
+    let mut candidates = screen(&none.base, &setting.original, &[], &evidence, &|m, s| setting.seeks(m, s));
     let residual = setting.data.layout.rms(&none.base.fit.residual);
     let detectable = detectability(&candidates);
     let search = Search::new(setting.clone(), options, hooks);
@@ -202,8 +205,9 @@ pub fn explore<'a, 'd>(
         None => (search, none),
     };
     // A simulation that is linear never parts from its machine: the noise of its free run is that of the force, and what predictions follow better is no
-    // noise of any spectrum, but a change, a shape, a memory.
-    if significant && !is_linear(none.base.model.simulation()) {
+    // noise of any spectrum, but a change, a shape, a memory. Nor does one that forgets where it was.
+    let parts = || !is_linear(none.base.model.simulation()) && !forgets(&none.base.model, &none.base.fit.theta);
+    if significant && parts() {
         forced = search.by_a_force(&none, &pool, candidates.len());
     }
     if let Some(p) = forced {
@@ -211,7 +215,7 @@ pub fn explore<'a, 'd>(
         (significant, p_value) = (false, p);
         pool.clear();
     }
-    if significant && let Some(note) = search.by_rounding(&none, &pool) {
+    if significant && let Some(note) = search.by_rounding(&none, &mut pool, candidates.len()) {
         notes.push(note);
         (significant, p_value) = (false, 1.0);
         pool.clear();

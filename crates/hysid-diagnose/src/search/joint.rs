@@ -4,6 +4,9 @@
 //! evidence space a pair costs two projections, so all pairs of the forty best candidates are compared before any simulation is run: forward
 //! regression in groups with a full second level instead of the greedy one.
 
+use std::ops::Range;
+
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::screen::Candidate;
@@ -14,6 +17,10 @@ use crate::model::hypothesis::are_one_sum;
 const MOST: usize = 40;
 /// Score by which a pair must exceed the better of its members.
 const LEAST_GAIN: f64 = 6.0;
+/// Square of what a column of unit norm leaves outside others below which it is nearly the same as they are.
+const NEARLY_THE_SAME: f64 = 1e-3;
+/// Rows whose products are summed at a time.
+const ROWS: usize = 256;
 
 /// A pair of candidates: places in the list, points of their grids, amplitudes by name.
 #[derive(Debug, Clone)]
@@ -31,6 +38,8 @@ struct Item<'a> {
     member: usize,
     point: usize,
     group: &'a FeatureGroup,
+    /// Its columns among those of all items.
+    columns: Range<usize>,
     names: Vec<String>,
     score: f64,
 }
@@ -38,34 +47,17 @@ struct Item<'a> {
 /// The pairs that explain the whitened residual `r` best, best first, each pair of effects once, at most `most`.
 pub fn pairs(candidates: &[Candidate], r: &[f64], most: usize) -> Vec<Pair> {
     let total = norm2(r);
-    let mut seen: Vec<(&str, &str)> = Vec::new();
-    let mut items: Vec<Item<'_>> = Vec::new();
-    let mut members = 0;
-    for (member, c) in candidates.iter().enumerate() {
-        // The best forty, and one of each family at each slot.
-        let place = (c.mechanism.family.name(), c.slot.label.as_str());
-        if members >= MOST && (seen.contains(&place) || members >= 2 * MOST) {
-            continue;
-        }
-        seen.push(place);
-        members += 1;
-        for (point, p) in c.points.iter().enumerate() {
-            if let Some(group) = &p.joint {
-                let names = p.amplitudes.iter().map(|a| a.0.clone()).collect();
-                items.push(Item { member, point, group, names, score: p.score });
-            }
-        }
-    }
+    let items = items(candidates);
+    let groups: Vec<&FeatureGroup> = items.iter().map(|i| i.group).collect();
+    let products = Products::new(&groups, r);
     let mut found: Vec<(usize, usize, f64)> = (0..items.len())
         .into_par_iter()
         .flat_map_iter(|a| {
-            let first = items[a].group;
-            let own = first.explained(r);
-            let left = outside(first, r);
-            let items = &items;
+            let (items, products) = (&items, &products);
+            let own = products.explained(&items[a].columns);
             (a + 1..items.len()).filter(move |&b| items[b].member != items[a].member).filter_map(move |b| {
-                let explained = own + beyond(first, items[b].group, &left);
-                let count = first.columns.len() + items[b].group.columns.len();
+                let explained = own + products.beyond(&items[a].columns, &items[b].columns).0;
+                let count = items[a].columns.len() + items[b].columns.len();
                 let joint = score(total, explained, r.len(), count);
                 (joint > items[a].score.max(items[b].score) + LEAST_GAIN).then_some((a, b, joint))
             })
@@ -91,7 +83,7 @@ pub fn pairs(candidates: &[Candidate], r: &[f64], most: usize) -> Vec<Pair> {
         out.push(Pair {
             members,
             points: [items[a].point, items[b].point],
-            amplitudes: amplitudes(&items[a], &items[b], r),
+            amplitudes: amplitudes([&items[a], &items[b]], &products, r),
         });
         if out.len() >= most {
             break;
@@ -100,58 +92,105 @@ pub fn pairs(candidates: &[Candidate], r: &[f64], most: usize) -> Vec<Pair> {
     out
 }
 
-/// What is left of `r` outside a group's columns.
-fn outside(group: &FeatureGroup, r: &[f64]) -> Vec<f64> {
-    let mut left = r.to_vec();
-    for g in &group.columns {
-        let c = dot(g, &left);
-        left.iter_mut().zip(g).for_each(|(l, g)| *l -= c * g);
-    }
-    left
-}
-
-/// Sum of squares of `left` (already outside `first`) along what `second` spans outside `first`.
-fn beyond(first: &FeatureGroup, second: &FeatureGroup, left: &[f64]) -> f64 {
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    let mut sum = 0.0;
-    for column in &second.columns {
-        let mut c = column.clone();
-        for q in first.columns.iter().chain(&basis) {
-            let along = dot(q, &c);
-            c.iter_mut().zip(q).for_each(|(c, q)| *c -= along * q);
-        }
-        let norm = norm2(&c);
-        // Nearly the same effect: what is left is rounding and curvature.
-        if norm < 1e-3 {
+/// The points whose columns were kept, of the best forty candidates and of one of each family at each slot. What one effect alone would be like is not
+/// what it is beside another: of two that nearly cancel each other the better points may be the wrong ones.
+fn items(candidates: &[Candidate]) -> Vec<Item<'_>> {
+    let mut seen: Vec<(&str, &str)> = Vec::new();
+    let mut items: Vec<Item<'_>> = Vec::new();
+    let (mut members, mut columns) = (0, 0);
+    for (member, c) in candidates.iter().enumerate() {
+        let place = (c.mechanism.family.name(), c.slot.label.as_str());
+        if members >= MOST && (seen.contains(&place) || members >= 2 * MOST) {
             continue;
         }
-        sum += dot(&c, left).powi(2) / norm;
-        c.iter_mut().for_each(|x| *x /= norm.sqrt());
-        basis.push(c);
+        seen.push(place);
+        members += 1;
+        for (point, p) in c.points.iter().enumerate() {
+            if let Some(group) = p.joint.as_ref().or(p.group.as_ref()) {
+                let names = p.amplitudes.iter().map(|a| a.0.clone()).collect();
+                let next = columns + group.columns.len();
+                items.push(Item { member, point, group, columns: columns..next, names, score: p.score });
+                columns = next;
+            }
+        }
     }
-    sum
+    items
 }
 
-/// Amplitudes of both by alternating projections.
-fn amplitudes(a: &Item<'_>, b: &Item<'_>, r: &[f64]) -> [Vec<(String, f64)>; 2] {
-    let fitted = |g: &FeatureGroup, r: &[f64]| -> Vec<f64> {
-        let mut f = vec![0.0; r.len()];
-        for q in &g.columns {
-            let c = dot(q, r);
-            f.iter_mut().zip(q).for_each(|(f, q)| *f += c * q);
+/// Products of all columns with each other and with the residual: what any two groups explain follows from these alone.
+struct Products {
+    gram: DMatrix<f64>,
+    right: Vec<f64>,
+}
+
+impl Products {
+    fn new(groups: &[&FeatureGroup], r: &[f64]) -> Self {
+        let columns: Vec<&[f64]> = groups.iter().flat_map(|g| g.columns.iter().map(Vec::as_slice)).collect();
+        let right = columns.iter().map(|c| dot(c, r)).collect();
+        let mut gram = DMatrix::zeros(columns.len(), columns.len());
+        // Some rows at a time: all columns in one matrix would be in memory twice.
+        for from in (0..r.len()).step_by(ROWS) {
+            let rows = from..(from + ROWS).min(r.len());
+            let some = DMatrix::from_fn(rows.len(), columns.len(), |i, j| columns[j][rows.start + i]);
+            gram.gemm_tr(1.0, &some, &some, 1.0);
         }
-        f
-    };
-    let less = |r: &[f64], f: &[f64]| -> Vec<f64> { r.iter().zip(f).map(|(r, f)| r - f).collect() };
-    let mut of_b = vec![0.0; r.len()];
-    let mut of_a = of_b.clone();
-    for _ in 0..40 {
-        of_a = fitted(a.group, &less(r, &of_b));
-        of_b = fitted(b.group, &less(r, &of_a));
+        Self { gram, right }
     }
+
+    /// Sum of squares of the residual along a group.
+    fn explained(&self, group: &Range<usize>) -> f64 {
+        self.right[group.clone()].iter().map(|x| x * x).sum()
+    }
+
+    /// The sum of squares of the residual along what `second` spans outside `first`, with the coefficients of the columns of `second` where both are
+    /// fitted: Cholesky's factor of what the columns leave outside the first group.
+    fn beyond(&self, first: &Range<usize>, second: &Range<usize>) -> (f64, Vec<f64>) {
+        let n = second.len();
+        let left = |x: &dyn Fn(usize) -> f64, j: usize| first.clone().map(|i| x(i) * self.gram[(i, j)]).sum::<f64>();
+        let mut factor = DMatrix::<f64>::zeros(n, n);
+        let mut along = vec![0.0; n];
+        for (j, column) in second.clone().enumerate() {
+            for (k, other) in second.clone().enumerate().take(j) {
+                if factor[(k, k)] > 0.0 {
+                    let product = self.gram[(column, other)] - left(&|i| self.gram[(i, other)], column);
+                    let known: f64 = (0..k).map(|l| factor[(j, l)] * factor[(k, l)]).sum();
+                    factor[(j, k)] = (product - known) / factor[(k, k)];
+                }
+            }
+            let known: f64 = (0..j).map(|l| factor[(j, l)].powi(2)).sum();
+            let pivot = self.gram[(column, column)] - left(&|i| self.gram[(i, column)], column) - known;
+            // Nearly the same effect: what is left is rounding and curvature.
+            if pivot < NEARLY_THE_SAME {
+                continue;
+            }
+            factor[(j, j)] = pivot.sqrt();
+            let known: f64 = (0..j).map(|l| factor[(j, l)] * along[l]).sum();
+            along[j] = (self.right[column] - left(&|i| self.right[i], column) - known) / factor[(j, j)];
+        }
+        let sum = along.iter().map(|x| x * x).sum();
+        for j in (0..n).rev().filter(|&j| factor[(j, j)] > 0.0) {
+            let known: f64 = (j + 1..n).map(|l| factor[(l, j)] * along[l]).sum();
+            along[j] = (along[j] - known) / factor[(j, j)];
+        }
+        (sum, along)
+    }
+}
+
+/// Amplitudes of both where they are fitted together.
+fn amplitudes(pair: [&Item<'_>; 2], products: &Products, r: &[f64]) -> [Vec<(String, f64)>; 2] {
+    let [a, b] = pair;
+    let less = |r: &[f64], group: &FeatureGroup, coefficients: &[f64]| -> Vec<f64> {
+        let mut left = r.to_vec();
+        for (q, c) in group.columns.iter().zip(coefficients) {
+            left.iter_mut().zip(q).for_each(|(l, q)| *l -= c * q);
+        }
+        left
+    };
+    let without_b = less(r, b.group, &products.beyond(&a.columns, &b.columns).1);
+    let of_a: Vec<f64> = a.group.columns.iter().map(|q| dot(q, &without_b)).collect();
     let named =
         |i: &Item<'_>, rest: &[f64]| i.names.iter().cloned().zip(i.group.amplitudes(rest, i.names.len())).collect();
-    [named(a, &less(r, &of_b)), named(b, &less(r, &of_a))]
+    [named(a, &without_b), named(b, &less(r, a.group, &of_a))]
 }
 
 #[cfg(test)]
@@ -176,7 +215,8 @@ mod tests {
         let r: Vec<f64> = (0..200).map(|i| ((i * i) as f64 * 0.013).cos()).collect();
         let (first, second) = (group(&a), group(&b));
         let both = Projector::new(a.into_iter().chain(b));
-        let found = first.explained(&r) + beyond(&first, &second, &outside(&first, &r));
+        let products = Products::new(&[&first, &second], &r);
+        let found = products.explained(&(0..2)) + products.beyond(&(0..2), &(2..4)).0;
         assert!((found - both.inside(&r)).abs() < 1e-9 * both.inside(&r), "{found} {}", both.inside(&r));
     }
 
@@ -185,8 +225,11 @@ mod tests {
         let (a, b) = (wave(3.0, 300), wave(3.05, 300));
         let r: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - 1.8 * b).collect();
         let groups = [group(&[a]), group(&[b])];
-        let item = |i: usize| Item { member: i, point: 0, group: &groups[i], names: vec!["w".into()], score: 0.0 };
-        let [x, y] = amplitudes(&item(0), &item(1), &r);
-        assert!((x[0].1 - 2.0).abs() < 0.05 && (y[0].1 + 1.8).abs() < 0.05, "{x:?} {y:?}");
+        let products = Products::new(&[&groups[0], &groups[1]], &r);
+        let named = || vec!["w".into()];
+        let item =
+            |i: usize| Item { member: i, point: 0, group: &groups[i], columns: i..i + 1, names: named(), score: 0.0 };
+        let [x, y] = amplitudes([&item(0), &item(1)], &products, &r);
+        assert!((x[0].1 - 2.0).abs() < 1e-9 && (y[0].1 + 1.8).abs() < 1e-9, "{x:?} {y:?}");
     }
 }

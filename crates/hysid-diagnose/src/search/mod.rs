@@ -120,7 +120,8 @@ impl<'a, 'd> Search<'a, 'd> {
     pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
         let base = self.setting.further(&none.base, None, 2, 25)?;
         let start = self.setting.hypothesis(Vec::new(), base);
-        let candidates = screen(&start.base, &self.setting.original, &[], &start.base.evidence(), &|_, _| true);
+        let sought = |m: &Mechanism, s: &Slot| self.setting.seeks(m, s);
+        let candidates = screen(&start.base, &self.setting.original, &[], &start.base.evidence(), &sought);
         Some((start, candidates))
     }
 
@@ -175,7 +176,12 @@ impl<'a, 'd> Search<'a, 'd> {
         let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
         let around = |h: &Hypothesis<'d>| self.around(h);
         let absorbed = |h: &Hypothesis<'d>| self.absorbed(h);
-        let hear = Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed };
+        let plainly = |h: &Hypothesis<'d>| {
+            let h = self.plainly(h)?;
+            let found = around(&h);
+            Some((h, found))
+        };
+        let hear = Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed, plainly: &plainly };
         compose(&self.setting, none, candidates, pool, bounds, &hear);
         keep_explaining(none, pool);
         self.screened.take();
@@ -226,7 +232,8 @@ impl<'a, 'd> Search<'a, 'd> {
             return known.clone();
         }
         let evidence = h.base.evidence();
-        let rest = screen(&h.base, &self.setting.original, &h.effects, &evidence, &|_, _| true);
+        let sought = |m: &Mechanism, s: &Slot| self.setting.seeks(m, s);
+        let rest = screen(&h.base, &self.setting.original, &h.effects, &evidence, &sought);
         let test = self.test(&rest, &h.base, &evidence);
         self.tests.borrow_mut().insert(key.clone(), test.clone());
         *self.screened.borrow_mut() = Some((key, rest));
@@ -237,21 +244,29 @@ impl<'a, 'd> Search<'a, 'd> {
     fn around(&self, h: &Hypothesis<'_>) -> Vec<Candidate> {
         let mut found = match self.screened.borrow_mut().take() {
             Some((key, found)) if key == fitted_key(h) => found,
-            _ => screen(&h.base, &self.setting.original, &h.effects, &h.base.evidence(), &|_, _| true),
+            _ => screen(&h.base, &self.setting.original, &h.effects, &h.base.evidence(), &|m, s| {
+                self.setting.seeks(m, s)
+            }),
         };
         tracked::include(&mut found, tracked::along_the_recording(&self.setting, h));
         found
+    }
+
+    /// A hypothesis under white noise; `None` where its noise is white.
+    fn plainly(&self, h: &Hypothesis<'d>) -> Option<Hypothesis<'d>> {
+        if h.base.whitener.is_white() || self.setting.budget.omits(Step::OtherNoise) {
+            return None;
+        }
+        let plain = Setting { noise: NoiseKind::White(1.0), ..self.setting.clone() };
+        let base = plain.further(&h.base, None, 1, PLAIN_ITERATIONS)?;
+        Some(plain.hypothesis(h.effects.clone(), base))
     }
 
     /// Offsets, drifts, ripples and lines that plain squares see around a hypothesis: a noise that rises towards low frequency holds the ones, an autoregression
     /// predicts the others, and under it their scores are nothing. Fitted beside the effects, each with a noise model of its own, the evidence tells
     /// which it is.
     fn absorbed(&self, h: &Hypothesis<'d>) -> Vec<Candidate> {
-        if h.base.whitener.is_white() || self.setting.budget.omits(Step::OtherNoise) {
-            return Vec::new();
-        }
-        let plain = Setting { noise: NoiseKind::White(1.0), ..self.setting.clone() };
-        let Some(base) = plain.further(&h.base, None, 1, PLAIN_ITERATIONS) else { return Vec::new() };
+        let Some(Hypothesis { base, .. }) = self.plainly(h) else { return Vec::new() };
         let lines = [Family::ExternalDisturbance, Family::PositionRipple];
         let like_noise = |m: &Mechanism, _: &Slot| m.family.is_slow_noise() || lines.contains(&m.family);
         let mut found = screen(&base, &self.setting.original, &h.effects, &base.evidence(), &like_noise);

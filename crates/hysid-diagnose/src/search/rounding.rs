@@ -7,27 +7,38 @@
 //! Reference: B. Widrow, I. Kollár, Quantization Noise, Cambridge University Press (2008), ch. 1.
 
 use hysid_signal::range;
+use rayon::prelude::*;
 
 use super::Search;
-use super::compose::best_of;
-use crate::mechanism::number_with_unit;
-use crate::model::hypothesis::{Effect, Hypothesis};
+use super::compose::{add, best_of};
+use super::fitting::refit;
+use super::screen::screen;
+use crate::budget::Step;
+use crate::mechanism::{Mechanism, number_with_unit};
+use crate::model::base::Base;
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
+use crate::slot::Slot;
 
 /// What is rounded to steps that are told as an effect otherwise.
 const ROUNDING: &str = "quantisation";
-/// Part of a step by which values on the steps may miss them: the step itself is read off the values.
+/// Part of a step by which values on the steps may miss them.
 const OFF_A_STEP: f64 = 0.1;
 /// Steps that the recording covers where they are fine.
 const FINE: f64 = 64.0;
-/// Share of what is left of another output that effects must not have taken from it.
-const NOTHING: f64 = 0.05;
+/// Share of what is left of an output from which on its rounding matters: that of the converter which every recording has does not.
+const MATTERS: f64 = 0.1;
+/// Log evidence from which on the rounding of converters is what is left, and share of that by which other effects must add to it: where no noise was rounded
+/// the right law leaves nothing at most samples and a whole step at a few, and a normal distribution grants much for a handful of these.
+const EXPLAINS: f64 = 12.0;
+const BESIDE: f64 = 0.05;
+/// Sets that are fitted beside the converters, and log evidence by which they may trail the best.
+const SETS: usize = 8;
+const TRAIL: f64 = 30.0;
 
 /// An effect that is the rounding of a fine converter.
 pub struct Converter {
     /// Its place in the set.
     pub member: usize,
-    /// The place of the output that it converts.
-    output: usize,
     /// The column and the step, in words.
     words: String,
 }
@@ -47,7 +58,45 @@ impl Converter {
     }
 }
 
-impl Search<'_, '_> {
+/// The steps on which all values lie; `None` where they lie on no steps, or cover less than [`FINE`] of them.
+fn fine_steps(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut levels: Vec<f64> = values.filter(|y| y.is_finite()).collect();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let (low, high) = range(levels.iter().copied());
+    let apart: Vec<f64> = levels.windows(2).map(|w| w[1] - w[0]).collect();
+    let least = apart.iter().copied().fold(f64::INFINITY, f64::min);
+    // A difference is as exact as the recording is written; the mean of those of one step is more so, and the whole range even more.
+    let (sum, single) = apart.iter().filter(|d| **d < 1.5 * least).fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
+    let count = ((high - low) * single / sum).round();
+    let q = (high - low) / count;
+    let off = |y: &f64| ((y - low) / q - ((y - low) / q).round()).abs();
+    (count.is_finite() && count >= FINE && levels.iter().all(|y| off(y) <= OFF_A_STEP)).then_some(q)
+}
+
+/// The steps of the fine converter on which the recorded values of an output lie.
+fn recorded_steps(setting: &Setting<'_>, output: usize) -> Option<f64> {
+    fine_steps(setting.data.stretches.iter().flat_map(|s| s.outputs[output].iter().copied()))
+}
+
+/// Labels of the outputs of which the recorded values lie on the steps of a fine converter, where its rounding is much of what is left.
+pub fn rounded(setting: &Setting<'_>, none: &Base<'_>) -> Vec<String> {
+    let left = setting.data.layout.rms(&none.fit.residual);
+    let matters =
+        |place: usize| recorded_steps(setting, place).is_some_and(|q| q / 12.0_f64.sqrt() >= MATTERS * left[place]);
+    let outputs = setting.original.outputs.iter().enumerate().filter(|(place, _)| matters(*place));
+    outputs.map(|(_, output)| format!("output:{}", output.column)).collect()
+}
+
+impl Setting<'_> {
+    /// Whether a mechanism is looked for at a slot. The rounding of fine converters is noise to the search: the step of one that rounds no noise outweighs
+    /// all physics, and beside it nothing is found in time.
+    pub fn seeks(&self, mechanism: &Mechanism, slot: &Slot) -> bool {
+        mechanism.id != ROUNDING || !self.rounded.contains(&slot.label)
+    }
+}
+
+impl<'d> Search<'_, 'd> {
     /// The members of a set that are the rounding of a fine converter on the steps of which the recorded values lie.
     pub fn converters(&self, set: &Hypothesis<'_>) -> Vec<Converter> {
         let values = set.base.values();
@@ -56,40 +105,68 @@ impl Search<'_, '_> {
             let place = outputs.iter().position(|o| effect.slot.label == format!("output:{}", o.column))?;
             let step = effect.written.report.first().filter(|_| effect.mechanism.id == ROUNDING)?;
             let q = *values.parameters.get(step.value.symbols().first()?)?;
-            let recorded = || {
-                let all = self.setting.data.stretches.iter().flat_map(|s| s.outputs[place].iter().copied());
-                all.filter(|y| y.is_finite())
-            };
-            let (low, high) = range(recorded());
-            let off = |y: f64| ((y - low) / q - ((y - low) / q).round()).abs();
-            let own = high - low >= FINE * q && recorded().all(|y| off(y) <= OFF_A_STEP);
+            let own = recorded_steps(&self.setting, place).is_some_and(|own| (q / own - 1.0).abs() <= OFF_A_STEP);
             let words = format!("`{}` ({})", outputs[place].column, number_with_unit(q, step.unit.as_ref()));
-            own.then_some(Converter { member, output: place, words })
+            own.then_some(Converter { member, words })
         };
         set.effects.iter().enumerate().filter_map(fine).collect()
     }
 
-    /// What to tell where the rounding of fine converters is all that stands of the pool, and no set in it takes anything from the other outputs.
-    pub fn by_rounding(&self, none: &Hypothesis<'_>, pool: &[Hypothesis<'_>]) -> Option<String> {
-        let set = &pool[best_of(pool)?];
-        let converters = self.converters(set);
-        if set.effects.is_empty() || converters.len() < set.effects.len() {
+    /// The converters of the recording alone, of the sets of a pool that has some.
+    pub fn of_converters(&self, pool: &[Hypothesis<'_>], set: usize) -> Option<usize> {
+        let converters = self.converters(&pool[set]);
+        let key = pool[set].key_of(|i| converters.iter().any(|c| c.member == i));
+        pool.iter().position(|h| !converters.is_empty() && h.key() == key)
+    }
+
+    /// What to tell where the rounding of fine converters explains what is left, and nothing that was found stands beside it: neither where that is noise as
+    /// any other, nor where it is written; `candidates` are so many. What does stand is added to the pool with the converters beside it.
+    pub fn by_rounding(
+        &self,
+        none: &Hypothesis<'d>,
+        pool: &mut Vec<Hypothesis<'d>>,
+        candidates: usize,
+    ) -> Option<String> {
+        let alone = beside_converters(&self.setting, none)?;
+        let explained = alone.log_evidence - none.log_evidence;
+        if explained < EXPLAINS {
             return None;
         }
-        let rms = |h: &Hypothesis<'_>| self.setting.data.layout.rms(&h.base.fit.residual);
-        let before = rms(none);
-        let takes = |h: &Hypothesis<'_>| {
-            let after = rms(h);
-            let is_rounded = |output: &usize| converters.iter().any(|c| c.output == *output);
-            (0..after.len()).filter(|i| !is_rounded(i)).any(|i| after[i] < (1.0 - NOTHING) * before[i])
-        };
-        (!pool.iter().any(takes)).then(|| {
-            format!(
-                "what is left is the rounding of the converter to the steps of {}: nothing else is in it, and it is taken for the noise of the recording",
-                Converter::list(&converters)
-            )
-        })
+        let mut order: Vec<&Hypothesis<'d>> = pool.iter().filter(|h| !h.effects.is_empty()).collect();
+        order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        let best = best_of(pool).map(|b| &pool[b]);
+        order.retain(|h| best.is_some_and(|b| h.log_evidence > b.log_evidence - TRAIL));
+        order.truncate(SETS);
+        let seen = self.likeliest(none, &order, candidates).is_some_and(|(p, _)| p < self.options.alpha);
+        let setting = &self.setting;
+        let beside: Vec<Hypothesis<'d>> =
+            order.into_par_iter().filter(|_| seen).filter_map(|h| beside_converters(setting, h)).collect();
+        let least = alone.log_evidence + (EXPLAINS + (candidates.max(1) as f64).ln()).max(BESIDE * explained);
+        if beside.iter().any(|h| h.log_evidence > least) {
+            beside.into_iter().chain([alone]).for_each(|h| add(pool, h));
+            return None;
+        }
+        Some(format!(
+            "what is left is the rounding of the converter to the steps of {}: nothing else is in it, and it is taken for the noise of the recording",
+            Converter::list(&self.converters(&alone))
+        ))
     }
+}
+
+/// A set with the converters of the recording written into it; `None` where it has none.
+fn beside_converters<'d>(setting: &Setting<'d>, set: &Hypothesis<'d>) -> Option<Hypothesis<'d>> {
+    let mut found: Option<Hypothesis<'d>> = None;
+    for label in &setting.rounded {
+        if setting.budget.omits(Step::Fits) {
+            return None;
+        }
+        let parent = found.as_ref().unwrap_or(set);
+        let converter = |m: &Mechanism, s: &Slot| m.id == ROUNDING && s.label == *label;
+        let evidence = parent.base.evidence();
+        let candidates = screen(&parent.base, &setting.original, &parent.effects, &evidence, &converter);
+        found = Some(refit(setting, parent, candidates.first()?)?);
+    }
+    found
 }
 
 #[cfg(test)]
@@ -117,11 +194,23 @@ mod tests {
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
-        let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        let (mut setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        setting.rounded = rounded(&setting, &none.base);
         let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let asked = |id: &str, slot: &str| search.answer(&none, &vec![(id.to_owned(), slot.to_owned())]);
-        let sets = [asked(ROUNDING, "output:x_m"), asked("coulomb_friction", "state:v")];
-        search.by_rounding(&none, &Vec::from_iter(sets.into_iter().flatten())).is_some()
+        let friction = asked("coulomb_friction", "state:v");
+        search.by_rounding(&none, &mut Vec::from_iter(friction), 50).is_some()
+    }
+
+    #[test]
+    fn steps_are_seen_through_the_digits_that_a_recording_is_written_with() {
+        let steps = |q: f64, digits: f64| (0..900).map(move |i| (q * f64::from(i * i % 700) * digits).round() / digits);
+        let found = fine_steps(steps(0.917_33, 1e3)).unwrap();
+        assert!((found / 0.917_33 - 1.0).abs() < 1e-5, "{found}");
+        assert_eq!(fine_steps(steps(0.917_33, 1e3).take(8)), None, "a handful of levels");
+        let mut random = normal(3);
+        assert_eq!(fine_steps((0..900).map(|_| random())), None);
+        assert_eq!(fine_steps(std::iter::repeat_n(1.0, 9)), None);
     }
 
     #[test]

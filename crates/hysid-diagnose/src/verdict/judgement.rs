@@ -67,11 +67,13 @@ impl<'d> Judgement<'d> {
         let least = least.as_ref().unwrap_or(&pool[0]);
         let standing = standing(pool, least).filter(|_| significant);
         let preferred = standing.map_or(0, |s| tie_broken(pool, &weighed, s, &blocks));
-        let (winner, trifles) = without_trifles(pool, preferred, least);
+        // Beside converters of the recording, effects are judged by what they add to these.
+        let from = search.of_converters(pool, preferred).unwrap_or(0);
+        let (winner, trifles) = without_trifles(pool, preferred, from, least);
         if winner != preferred {
             blocks[winner] = block_score(setting, &pool[winner]);
         }
-        let rest = Remaining::of(search, pool, winner, significant);
+        let rest = Remaining::of(search, pool, winner, from, significant);
         let probability = likelihoods(pool, &weighed, &blocks, winner, rest.imperfect);
         let mut support = firmness(pool, &weighed, &probability, winner, rest.imperfect);
         let best = &pool[winner];

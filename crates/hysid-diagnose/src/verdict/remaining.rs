@@ -53,9 +53,9 @@ pub struct Remaining<'d> {
 }
 
 impl<'d> Remaining<'d> {
-    /// Of the `winner` of a pool whose first set is the simulation without effects.
-    pub fn of(search: &Search<'_, 'd>, pool: &[Hypothesis<'d>], winner: usize, significant: bool) -> Self {
-        let (best, none) = (&pool[winner], &pool[0]);
+    /// Of the `winner` of a pool whose set at `from` is the simulation without effects, but for converters of the recording.
+    pub fn of(search: &Search<'_, 'd>, pool: &[Hypothesis<'d>], winner: usize, from: usize, significant: bool) -> Self {
+        let (best, none) = (&pool[winner], &pool[from]);
         let alpha = search.options.alpha;
         let budget = search.setting.budget;
         let test = (winner > 0 && !budget.omits(Step::Remains)).then(|| search.remains(best));

@@ -32,14 +32,20 @@ impl Trifle {
 
 /// The set of a pool that is told in the place of the `winner`: the same without the members that add next to nothing, the least first, and what these are.
 /// A member stays where the set without it was not fitted, and where that set leaves a larger error than the simulation as it is (`simulation`, where it
-/// leaves the least) and this one does not: under a noise that wanders a constant force brings little evidence, and most of the error may be its.
-pub fn without_trifles(pool: &[Hypothesis<'_>], winner: usize, simulation: &Hypothesis<'_>) -> (usize, Vec<Trifle>) {
-    let gain = |i: usize| pool[i].log_evidence - pool[0].log_evidence;
+/// leaves the least) and this one does not: under a noise that wanders a constant force brings little evidence, and most of the error may be its. What is
+/// brought counts from the set at `from`: the simulation as it is, or that with the converters of the recording.
+pub fn without_trifles(
+    pool: &[Hypothesis<'_>],
+    winner: usize,
+    from: usize,
+    simulation: &Hypothesis<'_>,
+) -> (usize, Vec<Trifle>) {
+    let gain = |i: usize| pool[i].log_evidence - pool[from].log_evidence;
     let (mut told, mut trifles) = (winner, Vec::new());
     loop {
         let best = &pool[told];
         let whole = gain(told);
-        if best.effects.len() < 2 || !(whole > 0.0) {
+        if best.effects.len() < 2 + pool[from].effects.len() || !(whole > 0.0) {
             break;
         }
         let share = |member: usize| {
@@ -90,7 +96,7 @@ mod tests {
         let spring = fitted(&none, "cubic_stiffness");
         let (both, offset) = (fitted(&spring, "output_offset"), fitted(&none, "output_offset"));
         let pool = [none, spring, offset, both];
-        let (place, trifles) = without_trifles(&pool, 3, &pool[0]);
+        let (place, trifles) = without_trifles(&pool, 3, 0, &pool[0]);
         (pool[place].effects.iter().map(|e| e.mechanism.id).collect(), trifles.len())
     }
 

@@ -21,24 +21,34 @@ fn baseline(inflow: &str) -> String {
     )
 }
 
-/// Inflow in steps of a minute and more, and the level that follows it, with the noise of its sensor.
-fn recording(name: &str, inflow: &str, seed: u64, enters: impl Fn(f64) -> f64) -> Recording {
+/// The exact step of a linear tank under a constant inflow, over so many seconds.
+fn relaxed(level: f64, inflow: f64, outflow: f64, seconds: f64) -> f64 {
+    let rest = inflow / outflow;
+    rest + (level - rest) * (-outflow / REAL.0 * seconds).exp()
+}
+
+/// Inflow in steps of a minute and more, and the level that follows it, with the noise of its sensor; `next` is the level after a sampling period, of the
+/// number of that period, the inflow before and in it and the level at its beginning.
+fn filled(name: &str, inflow: &str, seed: u64, next: impl Fn(usize, [f64; 2], f64) -> f64) -> Recording {
     let mut random = normal(seed);
     let (mut u, mut level, mut h, mut flow) = (Vec::new(), Vec::new(), 0.0, 0.0);
     for i in 0..1200 {
+        let before = flow;
         if i % 25 == 0 {
             flow = (0.014 + 0.006 * random()).max(0.0);
         }
         u.push(flow);
         level.push(h + 0.004 * random());
-        // The exact step of a linear tank under a constant inflow.
-        let (area, outflow) = REAL;
-        let rest = enters(flow) / outflow;
-        h = rest + (h - rest) * (-outflow / area * PERIOD).exp();
+        h = next(i, [if i == 0 { flow } else { before }, flow], h);
     }
     let channels =
         vec![Channel { name: inflow.into(), samples: u }, Channel { name: "level_m".into(), samples: level }];
     Recording::new(name, Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap()
+}
+
+/// The same of a tank that is as its simulation but for what enters.
+fn recording(name: &str, inflow: &str, seed: u64, enters: impl Fn(f64) -> f64) -> Recording {
+    filled(name, inflow, seed, |_, [_, flow], h| relaxed(h, enters(flow), REAL.1, PERIOD))
 }
 
 /// Under a column that ends in a flow, and under one whose end is taken for a unit that clashes with those of the file.
@@ -87,4 +97,24 @@ fn a_gauge_that_stops_is_named_however_far_from_zero_it_reads() {
     let effect = d.effects.first().expect(&d.summary);
     assert_eq!((effect.mechanism.as_str(), d.verdict), ("output_saturation", VerdictKind::Named), "{}", d.summary);
     assert!((effect.parameters[0].value - most).abs() < 0.01, "{:?}", effect.parameters);
+}
+
+/// Beside a delay an outlet that clogs a little and a gauge that reads too little explain nothing one after the other: either leaves what is slow, which
+/// a noise model takes for noise.
+#[test]
+fn two_slow_effects_beside_a_third_are_found_together() {
+    let (delay, moment, clogged, offset) = (1.8, 520, 0.992, -0.01);
+    let of = |name: &str, seed, worn: usize| {
+        let real = filled(name, "inflow_m3_s", seed, |i, [before, flow], h| {
+            let outflow = if i < worn { REAL.1 } else { clogged * REAL.1 };
+            relaxed(relaxed(h, before, outflow, delay), flow, outflow, PERIOD - delay)
+        });
+        let mut channels = real.channels().to_vec();
+        channels[1].samples.iter_mut().for_each(|y| *y += offset);
+        Recording::new(name, real.clock(), channels).unwrap()
+    };
+    let d = run(&baseline("inflow_m3_s"), &[of("est.csv", 1, moment)], &[of("val.csv", 2, 0)]).unwrap().file;
+    let mut families: Vec<&str> = d.effects.iter().map(|e| e.family.as_str()).collect();
+    families.sort_unstable();
+    assert_eq!(families, ["bias", "signal_path_lag", "time_variation"], "{}", d.summary);
 }
