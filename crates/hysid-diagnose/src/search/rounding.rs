@@ -112,7 +112,7 @@ impl<'d> Search<'_, 'd> {
         set.effects.iter().enumerate().filter_map(fine).collect()
     }
 
-    /// The converters of the recording alone, of the sets of a pool that has some.
+    /// The place in a pool of the set that is nothing but those converters of the recording which one of its sets has; `None` where that has none.
     pub fn of_converters(&self, pool: &[Hypothesis<'_>], set: usize) -> Option<usize> {
         let converters = self.converters(&pool[set]);
         let key = pool[set].key_of(|i| converters.iter().any(|c| c.member == i));
