@@ -202,9 +202,6 @@ impl Unit {
             return Self::of_quotient(&parts[..per], &parts[per + 1..]);
         }
         let (&last, before) = parts.split_last()?;
-        let quotient = |(above, power): (&str, i32), (below, per): (&str, i32)| Self {
-            factors: vec![(above.to_owned(), ONE * power), (below.to_owned(), -ONE * per)],
-        };
         let above = before.last().copied().unwrap_or_default();
         // A time after a unit divides by it; alone it is a time.
         let time = match last {
@@ -213,14 +210,14 @@ impl Unit {
             _ => None,
         };
         if let Some((above, time)) = powered(above).zip(time) {
-            return Some(quotient(above, time));
+            return Some(Self::quotient(&[above], &[time]));
         }
         match (above, powered(last)) {
-            ("mol", Some(below)) => return Some(quotient((above, 1), below)),
+            ("mol", Some(below)) => return Some(Self::quotient(&[(above, 1)], &[below])),
             // One letter may be the name of a part as well as a unit.
             ("A" | "V" | "W" | "N" | "J", Some(_)) => return None,
             (_, Some(below)) if above.len() > 1 && exponents(above).is_some() => {
-                return Some(quotient((above, 1), below));
+                return Some(Self::quotient(&[(above, 1)], &[below]));
             }
             _ => {}
         }
@@ -230,13 +227,17 @@ impl Unit {
 
     /// The units that the one list ends in over all of the other; `None` where any of these is not known.
     fn of_quotient(above: &[&str], below: &[&str]) -> Option<Self> {
-        let above: Vec<(&str, i32)> = above.iter().rev().map_while(|name| powered(name)).collect();
+        let unknown = above.iter().rposition(|name| powered(name).is_none());
+        let above: Vec<(&str, i32)> =
+            above.iter().skip(unknown.map_or(0, |i| i + 1)).filter_map(|n| powered(n)).collect();
         let below: Vec<(&str, i32)> = below.iter().map(|name| powered(name)).collect::<Option<_>>()?;
-        let side = |list: &[(&str, i32)], sign: i32| -> Vec<(String, i32)> {
-            list.iter().map(|(name, power)| ((*name).to_owned(), sign * ONE * power)).collect()
-        };
-        let factors = [side(&above.iter().rev().copied().collect::<Vec<_>>(), 1), side(&below, -1)].concat();
-        (!above.is_empty() && !below.is_empty()).then_some(Self { factors })
+        (!above.is_empty() && !below.is_empty()).then(|| Self::quotient(&above, &below))
+    }
+
+    /// Known names with their powers over others.
+    fn quotient(above: &[(&str, i32)], below: &[(&str, i32)]) -> Self {
+        let factor = |sign: i32| move |(name, power): &(&str, i32)| ((*name).to_owned(), sign * ONE * power);
+        Self { factors: above.iter().map(factor(1)).chain(below.iter().map(factor(-1))).collect() }
     }
 }
 

@@ -99,12 +99,7 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
 ///
 /// Reference: E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed. (2006), sec. IX.1 (modified equations).
 fn explicit(simulation: &Simulation, step_s: f64) -> Option<Simulation> {
-    let remembers = simulation.states.iter().any(|s| {
-        let mut found = false;
-        s.derivative.visit(&mut |e| found |= matches!(e, Expr::Memory(..)));
-        found
-    });
-    if simulation.is_static() || remembers {
+    if simulation.is_static() || simulation.states.iter().any(|s| s.derivative.has_memory()) {
         return None;
     }
     let earlier = |e: Expr| match &e {

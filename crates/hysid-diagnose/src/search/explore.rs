@@ -4,7 +4,7 @@ use super::Search;
 use super::compose::{add, best_of};
 use super::detectable::detectability;
 use super::rounding::rounded;
-use super::screen::{Candidate, screen};
+use super::screen::Candidate;
 use super::tracked;
 use crate::budget::Step;
 use crate::calibration::fair::recalibrated;
@@ -100,7 +100,7 @@ pub fn explore<'a, 'd>(
 
     (hooks.progress)("looking for what could be missing");
     let evidence = none.base.evidence();
-    let mut candidates = screen(&none.base, &setting.original, &[], &evidence, &|m, s| setting.seeks(m, s));
+    let mut candidates = setting.lacking(&none, &evidence);
     let residual = setting.data.layout.rms(&none.base.fit.residual);
     let detectable = detectability(&candidates);
     let search = Search::new(setting.clone(), options, hooks);

@@ -1,8 +1,8 @@
 //! Superposed effects: pairs of candidates that explain the residual together.
 //!
 //! One effect can hide another: alone neither explains enough to lead the list, and a greedy search builds on the wrong first pick. In the
-//! evidence space a pair costs two projections, so all pairs of the forty best candidates are compared before any simulation is run: forward
-//! regression in groups with a full second level instead of the greedy one.
+//! evidence space what a pair explains follows from products of columns that are taken once, so all pairs of the forty best candidates are
+//! compared before any simulation is run: forward regression in groups with a full second level instead of the greedy one.
 
 use std::ops::Range;
 

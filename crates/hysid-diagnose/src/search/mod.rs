@@ -120,8 +120,7 @@ impl<'a, 'd> Search<'a, 'd> {
     pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
         let base = self.setting.further(&none.base, None, 2, 25)?;
         let start = self.setting.hypothesis(Vec::new(), base);
-        let sought = |m: &Mechanism, s: &Slot| self.setting.seeks(m, s);
-        let candidates = screen(&start.base, &self.setting.original, &[], &start.base.evidence(), &sought);
+        let candidates = self.setting.lacking(&start, &start.base.evidence());
         Some((start, candidates))
     }
 
@@ -232,8 +231,7 @@ impl<'a, 'd> Search<'a, 'd> {
             return known.clone();
         }
         let evidence = h.base.evidence();
-        let sought = |m: &Mechanism, s: &Slot| self.setting.seeks(m, s);
-        let rest = screen(&h.base, &self.setting.original, &h.effects, &evidence, &sought);
+        let rest = self.setting.lacking(h, &evidence);
         let test = self.test(&rest, &h.base, &evidence);
         self.tests.borrow_mut().insert(key.clone(), test.clone());
         *self.screened.borrow_mut() = Some((key, rest));
@@ -244,9 +242,7 @@ impl<'a, 'd> Search<'a, 'd> {
     fn around(&self, h: &Hypothesis<'_>) -> Vec<Candidate> {
         let mut found = match self.screened.borrow_mut().take() {
             Some((key, found)) if key == fitted_key(h) => found,
-            _ => screen(&h.base, &self.setting.original, &h.effects, &h.base.evidence(), &|m, s| {
-                self.setting.seeks(m, s)
-            }),
+            _ => self.setting.lacking(h, &h.base.evidence()),
         };
         tracked::include(&mut found, tracked::along_the_recording(&self.setting, h));
         found

@@ -12,8 +12,9 @@ use rayon::prelude::*;
 use super::Search;
 use super::compose::{add, best_of};
 use super::fitting::refit;
-use super::screen::screen;
+use super::screen::{Candidate, screen};
 use crate::budget::Step;
+use crate::evidence::Projector;
 use crate::mechanism::{Mechanism, number_with_unit};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
@@ -89,10 +90,11 @@ pub fn rounded(setting: &Setting<'_>, none: &Base<'_>) -> Vec<String> {
 }
 
 impl Setting<'_> {
-    /// Whether a mechanism is looked for at a slot. The rounding of fine converters is noise to the search: the step of one that rounds no noise outweighs
-    /// all physics, and beside it nothing is found in time.
-    pub fn seeks(&self, mechanism: &Mechanism, slot: &Slot) -> bool {
-        mechanism.id != ROUNDING || !self.rounded.contains(&slot.label)
+    /// What could be missing around a hypothesis. The rounding of fine converters is noise to the search: the step of one that rounds no noise outweighs all
+    /// physics, and beside it nothing is found in time.
+    pub fn lacking(&self, h: &Hypothesis<'_>, evidence: &(Projector, Vec<f64>)) -> Vec<Candidate> {
+        let sought = |m: &Mechanism, s: &Slot| m.id != ROUNDING || !self.rounded.contains(&s.label);
+        screen(&h.base, &self.original, &h.effects, evidence, &sought)
     }
 }
 

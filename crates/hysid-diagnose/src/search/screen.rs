@@ -17,7 +17,7 @@ use crate::model::hypothesis::{Effect, Key};
 use crate::model::{Model, Values, along};
 use crate::slot::{Slot, Structure};
 
-/// Points of a candidate whose columns are kept for pairs.
+/// Points of a candidate, the best, whose columns are kept for pairs beside those of the mismatch test.
 pub const JOINT: usize = 2;
 /// Points of a candidate whose columns take part in the mismatch test: at least, and at most as the rows allow (the columns are held in memory).
 /// A resonance between two of a few points shows in none of them.
@@ -40,7 +40,7 @@ pub struct Point {
     pub shapes: Vec<(String, f64)>,
     /// Its columns in the evidence space; kept for a spread of points ([`kept`] at most), chosen without looking at the residual.
     pub group: Option<FeatureGroup>,
-    /// Its columns, kept for the best points that are no neighbours: pairs of candidates are judged by them.
+    /// Its columns, kept for the best points: pairs of candidates are judged by these and by those of `group`.
     pub joint: Option<FeatureGroup>,
     /// Share of its response that the simulation's own parameters absorb.
     pub concealment: f64,
