@@ -227,9 +227,8 @@ impl Unit {
 
     /// The units that the one list ends in over all of the other; `None` where any of these is not known.
     fn of_quotient(above: &[&str], below: &[&str]) -> Option<Self> {
-        let unknown = above.iter().rposition(|name| powered(name).is_none());
-        let above: Vec<(&str, i32)> =
-            above.iter().skip(unknown.map_or(0, |i| i + 1)).filter_map(|n| powered(n)).collect();
+        let mut above: Vec<(&str, i32)> = above.iter().rev().map_while(|name| powered(name)).collect();
+        above.reverse();
         let below: Vec<(&str, i32)> = below.iter().map(|name| powered(name)).collect::<Option<_>>()?;
         (!above.is_empty() && !below.is_empty()).then(|| Self::quotient(&above, &below))
     }
