@@ -9,8 +9,8 @@ pub struct LmOptions {
     pub tolerance: f64,
 }
 
-/// Log likelihood, in nats, that a fit need not go on for: less than a twentieth of a standard deviation of one unknown.
-const NEGLIGIBLE: f64 = 1e-3;
+/// Log likelihood, in nats, that a fit need not go on for: a fifth of a standard deviation of one unknown.
+const NEGLIGIBLE: f64 = 2e-2;
 
 impl LmOptions {
     /// At most so many iterations on so many rows of unknown noise: to within [`NEGLIGIBLE`] of the likeliest.
