@@ -230,6 +230,9 @@ fn statement(
     if let Some(why) = judged.veto {
         file.notes.push(format!("{why}, and no augmented simulation is written"));
     }
+    if judged.rest.pushed {
+        file.notes.push("predicted from sample to sample, the simulation with these effects follows the recording far better than anything does that could be fitted to what its free run leaves: random forces that act on the machine explain that".into());
+    }
     if judged.unexplained() {
         file.notes.push("simulation and recording differ by more than noise does, but no effect and no generic term outweighs what its parameters cost: what is told is the likeliest, and no augmented simulation is written".into());
     }

@@ -60,8 +60,7 @@ pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<Alterna
     order.sort_by(|&a, &b| weighed[b].log_evidence.total_cmp(&weighed[a].log_evidence));
     for i in order {
         for e in &pool[i].effects {
-            let winning =
-                pool[winner].effects.iter().any(|w| w.mechanism.id == e.mechanism.id && w.slot.label == e.slot.label);
+            let winning = pool[winner].effects.iter().any(|w| w.states_the_same(e));
             let listed = out.iter().any(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
             if listed || (winning && kind != VerdictKind::Ambiguous) {
                 continue;

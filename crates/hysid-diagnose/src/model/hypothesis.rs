@@ -28,6 +28,11 @@ pub struct Effect {
 }
 
 impl Effect {
+    /// Whether the other is the same mechanism at the same slot.
+    pub fn states_the_same(&self, other: &Self) -> bool {
+        self.mechanism.id == other.mechanism.id && self.slot.label == other.slot.label
+    }
+
     /// Whether it is a limit, which may act on one side or on both.
     pub fn is_a_limit(&self) -> bool {
         self.mechanism.law_at(&self.slot, Purpose::Screening).amplitudes == Amplitudes::OfTwoSides

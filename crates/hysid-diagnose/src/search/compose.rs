@@ -34,6 +34,8 @@ pub struct Ask<'a, 'd> {
     pub absorbed: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
     /// The hypothesis under white noise, with what could be missing around it there; `None` where its noise is white.
     pub plainly: &'a dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)>,
+    /// Whether an unknown force on the machine explains what sets of more effects add to one that stands.
+    pub pushed: &'a dyn Fn(&Hypothesis<'d>, &[Hypothesis<'d>]) -> bool,
 }
 
 /// Log evidence that another effect must add.
@@ -134,6 +136,9 @@ pub fn compose<'d>(
             break;
         }
         let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        if reached >= best + LEAST_GAIN && (ask.pushed)(&pool[standing], &found) {
+            break;
+        }
         for h in found {
             add(pool, h);
         }

@@ -3,6 +3,7 @@
 use super::Search;
 use super::compose::{add, best_of};
 use super::detectable::detectability;
+use super::prediction::parts;
 use super::rounding::rounded;
 use super::screen::Candidate;
 use super::tracked;
@@ -12,10 +13,8 @@ use crate::calibration::lesson::{Done, Lesson, lesson};
 use crate::evidence::correlation_time;
 use crate::file::DetectableRecord;
 use crate::model::base::{Base, NoiseKind};
-use crate::model::force::forgets;
 use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::request::{Hooks, Request, words};
-use crate::slot::is_linear;
 
 /// What was found on one calibration.
 pub struct Explored<'a, 'd> {
@@ -204,10 +203,7 @@ pub fn explore<'a, 'd>(
         Some(lesson) => return again(lesson),
         None => (search, none),
     };
-    // A simulation that is linear never parts from its machine: the noise of its free run is that of the force, and what predictions follow better is no
-    // noise of any spectrum, but a change, a shape, a memory. Nor does one that forgets where it was.
-    let parts = || !is_linear(none.base.model.simulation()) && !forgets(&none.base.model, &none.base.fit.theta);
-    if significant && parts() {
+    if significant && parts(&none) {
         forced = search.by_a_force(&none, &pool, candidates.len());
     }
     if let Some(p) = forced {

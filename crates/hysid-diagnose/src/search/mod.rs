@@ -180,7 +180,9 @@ impl<'a, 'd> Search<'a, 'd> {
             let found = around(&h);
             Some((h, found))
         };
-        let hear = Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed, plainly: &plainly };
+        let pushed = |h: &Hypothesis<'d>, sets: &[Hypothesis<'d>]| self.is_pushed_rather(h, sets, candidates.len());
+        let hear =
+            Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed, plainly: &plainly, pushed: &pushed };
         compose(&self.setting, none, candidates, pool, bounds, &hear);
         keep_explaining(none, pool);
         self.screened.take();

@@ -12,10 +12,12 @@ use rayon::prelude::*;
 
 use super::Search;
 use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
+use crate::model::force::forgets;
 use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::model::{Model, Values};
 use crate::openset::{ODDS_AGAINST, OpenSet};
 use crate::refit::LmOptions;
+use crate::slot::is_linear;
 
 /// How strong the unknown force may be, over the inputs.
 const STRENGTHS: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
@@ -27,66 +29,111 @@ const WEIGHED: usize = 4;
 /// Rounds of unknowns and noise by turns, and iterations in each.
 const ROUNDS: usize = 2;
 const ITERATIONS: usize = 12;
+/// Iterations that tell at which strengths it does well, and how many of these are fitted to the end.
+const SKETCH: usize = 2;
+const LIKELY: usize = 2;
+
+/// Whether a simulation parts from its machine where a force that nobody recorded acts on that. One that is linear never does: the noise of its free run is
+/// that of the force, and what predictions follow better is no noise of any spectrum, but a change, a shape, a memory. Nor does one that forgets where it was.
+pub fn parts(h: &Hypothesis<'_>) -> bool {
+    !is_linear(h.base.model.simulation()) && !forgets(&h.base.model, &h.base.fit.theta)
+}
+
+/// A set of effects, running free and predicting.
+struct Weighed<'h, 'd> {
+    free: &'h Hypothesis<'d>,
+    predicting: Option<Hypothesis<'d>>,
+}
+
+impl<'d> Weighed<'_, 'd> {
+    /// The better of the two.
+    fn better(&self) -> &Hypothesis<'d> {
+        self.predicting.as_ref().filter(|p| p.log_evidence > self.free.log_evidence).unwrap_or(self.free)
+    }
+}
 
 impl<'d> Search<'_, 'd> {
     /// The probability, beyond the level, that sets gain by chance what they gain over a simulation on which an unknown force acts; `None` where
     /// there is no such force, or where sets or generic terms tell more than it does.
     pub fn by_a_force(&self, none: &Hypothesis<'d>, pool: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
-        let setting = &self.setting;
-        let simulation = none.base.model.simulation();
-        if setting.noise != NoiseKind::Coloured || setting.pushed.is_empty() {
-            return None;
-        }
-        let as_it_is = |from: &Base<'d>| predicted(setting, simulation, from);
-        let first = as_it_is(&none.base)?;
-        let beyond = |b: &Base<'_>| b.log_likelihood - none.base.log_likelihood;
-        if beyond(&first) < FORCE {
-            return None;
-        }
-        let mut order: Vec<&Hypothesis<'d>> = pool.iter().filter(|h| !h.effects.is_empty()).collect();
-        order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        // Where time is up there is some for the likeliest.
-        order.truncate(if setting.budget.affords(0.0) { WEIGHED } else { 1 });
-        let sets: Vec<(&Hypothesis<'d>, Option<Hypothesis<'d>>)> = order
-            .into_iter()
-            .map(|h| {
-                let base = predicted(setting, h.base.model.simulation(), &h.base);
-                (h, base.map(|base| setting.hypothesis(h.effects.clone(), base)))
-            })
-            .collect();
-        // Beside an effect parameters may be reached that predict better without it too.
-        let returned = sets.iter().filter_map(|(_, p)| as_it_is(&p.as_ref()?.base));
-        let best = returned.fold(first, |a, b| if b.log_likelihood > a.log_likelihood { b } else { a });
-        let force = beyond(&best);
+        let (pushed, sets) = self.beside_a_force(none, pool.iter().filter(|h| !h.effects.is_empty()).collect())?;
+        let force = pushed.base.log_likelihood - none.base.log_likelihood;
         let told = |o: &OpenSet| o.by_chance(ODDS_AGAINST) < self.options.alpha && o.gain > force;
         if self.open(none).as_ref().is_some_and(told) {
             return None;
         }
-        let pushed = setting.hypothesis(Vec::new(), best);
-        let sets: Vec<&Hypothesis<'d>> = sets
-            .iter()
-            .map(|(free, p)| p.as_ref().filter(|p| p.log_evidence > free.log_evidence).unwrap_or(free))
-            .collect();
+        let sets: Vec<&Hypothesis<'d>> = sets.iter().map(Weighed::better).collect();
         let (p, _) = self.likeliest(&pushed, &sets, candidates)?;
         (p >= self.options.alpha).then_some(p)
+    }
+
+    /// Whether an unknown force that acts on the machine explains what the likeliest of these sets, all of more effects, add to one that stands.
+    pub fn is_pushed_rather(&self, stands: &Hypothesis<'d>, wider: &[Hypothesis<'d>], candidates: usize) -> bool {
+        let weighed = if parts(stands) { self.beside_a_force(stands, wider.iter().collect()) } else { None };
+        let Some((pushed, sets)) = weighed else { return false };
+        let sets: Vec<&Hypothesis<'d>> = sets.iter().map(Weighed::better).collect();
+        self.likeliest(&pushed, &sets, candidates).is_some_and(|(p, _)| p >= self.options.alpha)
+    }
+
+    /// What predictions of a set gain in log likelihood over its free run under an unknown force that acts on the machine; `None` where no such force shows.
+    pub fn force_on(&self, set: &Hypothesis<'d>) -> Option<f64> {
+        let pushed = if parts(set) { self.pushed(set) } else { None };
+        pushed.map(|base| base.log_likelihood - set.base.log_likelihood)
+    }
+
+    /// A set that predicts each row under an unknown force, fitted from its free run; `None` where no such force shows.
+    fn pushed(&self, set: &Hypothesis<'d>) -> Option<Base<'d>> {
+        if self.setting.noise != NoiseKind::Coloured || self.setting.pushed.is_empty() {
+            return None;
+        }
+        let base = predicted(&self.setting, set.base.model.simulation(), &set.base)?;
+        (base.log_likelihood > set.base.log_likelihood + FORCE).then_some(base)
+    }
+
+    /// What stands, predicting each row under an unknown force, and the likeliest of these sets of more effects; `None` where no such force shows.
+    fn beside_a_force<'h>(
+        &self,
+        stands: &Hypothesis<'d>,
+        mut wider: Vec<&'h Hypothesis<'d>>,
+    ) -> Option<(Hypothesis<'d>, Vec<Weighed<'h, 'd>>)> {
+        let setting = &self.setting;
+        let first = self.pushed(stands)?;
+        wider.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        // Where time is up there is some for the likeliest.
+        wider.truncate(if setting.budget.affords(0.0) { WEIGHED } else { 1 });
+        let weighed = |free: &'h Hypothesis<'d>| {
+            let base = predicted(setting, free.base.model.simulation(), &free.base);
+            Weighed { free, predicting: base.map(|base| setting.hypothesis(free.effects.clone(), base)) }
+        };
+        let sets: Vec<Weighed<'h, 'd>> = wider.into_iter().map(weighed).collect();
+        // Beside an effect parameters may be reached that predict better without it too.
+        let as_it_is = |from: &Base<'d>| predicted(setting, stands.base.model.simulation(), from);
+        let returned = sets.iter().filter_map(|set| as_it_is(&set.predicting.as_ref()?.base));
+        let best = returned.fold(first, |a, b| if b.log_likelihood > a.log_likelihood { b } else { a });
+        Some((setting.hypothesis(stands.effects.clone(), best), sets))
     }
 }
 
 /// A simulation that predicts each row from those before, with the force under which it does best, fitted from where another one stands.
 fn predicted<'d>(setting: &Setting<'d>, document: &Simulation, from: &Base<'d>) -> Option<Base<'d>> {
     let (values, substeps) = (from.values(), from.model.substeps());
-    let options = LmOptions::within(ITERATIONS, setting.data.rows());
-    let fitted = |strength: f64, values: &Values| {
+    let fitted = |strength: f64, values: &Values, rounds: usize, iterations: usize| {
+        let options = LmOptions::within(iterations, setting.data.rows());
         let model = Model::new(document, setting.data, substeps).ok()?;
         let theta = model.theta(values);
         let model = model.predicting(&theta, strength)?;
-        fit_simulation(model, Start::Values(values), &[], None, ROUNDS, options, setting.noise)
+        fit_simulation(model, Start::Values(values), &[], None, rounds, options, setting.noise)
     };
-    let all: Vec<(f64, Base<'d>)> =
-        STRENGTHS.par_iter().filter_map(|strength| Some((*strength, fitted(*strength, &values)?))).collect();
-    let (strength, best) = all.into_iter().max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood))?;
+    let at = |strengths: &[f64], rounds: usize, iterations: usize| -> Vec<(f64, Base<'d>)> {
+        let all = strengths.par_iter().filter_map(|&s| Some((s, fitted(s, &values, rounds, iterations)?)));
+        let mut all: Vec<(f64, Base<'d>)> = all.collect();
+        all.sort_by(|a, b| b.1.log_likelihood.total_cmp(&a.1.log_likelihood));
+        all
+    };
+    let likely: Vec<f64> = at(&STRENGTHS, 1, SKETCH).iter().take(LIKELY).map(|(strength, _)| *strength).collect();
+    let (strength, best) = at(&likely, ROUNDS, ITERATIONS).into_iter().next()?;
     // Once more, with the gain of where it went.
-    let again = fitted(strength, &best.values()).filter(|b| b.log_likelihood > best.log_likelihood);
+    let again = fitted(strength, &best.values(), ROUNDS, ITERATIONS).filter(|b| b.log_likelihood > best.log_likelihood);
     Some(again.unwrap_or(best))
 }
 
@@ -101,10 +148,12 @@ mod tests {
     use crate::search::screen::screen;
 
     const FRICTION: f64 = 8.0;
+    /// Effects that could be missing there, about.
+    const CANDIDATES: usize = 30;
 
-    /// What is said of an axis in a position loop that sticks at each turn, integrated by hand, under forces of this size (rms, over its friction) which
-    /// nobody recorded, with a cogging of this size, where this effect is fitted; and what that gains.
-    fn axis(forces: f64, cogging: f64, id: &str) -> (Option<f64>, f64) {
+    /// Asks about an axis in a position loop that sticks at each turn, integrated by hand, under forces of this size (rms, over its friction) which
+    /// nobody recorded, with a cogging of this size.
+    fn axis<T>(forces: f64, cogging: f64, ask: impl FnOnce(&Search<'_, '_>, &Hypothesis<'_>) -> T) -> T {
         let text = "[time]\nperiod_s = 0.01\n[inputs]\nr = \"ref_m\"\n[parameters]\nm = { value = 5.0, min = 1.0, max = 16.0, unit = \"kg\" }\n\
                     c = { value = 30.0, min = 9.0, max = 90.0, unit = \"N s/m\" }\nFc = { value = 8.0, min = 2.0, max = 30.0, unit = \"N\" }\n[states]\n\
                     x = { derivative = \"v\", initial = 0.0, unit = \"m\" }\n\
@@ -136,19 +185,49 @@ mod tests {
         let data = recorded(&original, 0.01, [("ref_m", r), ("x_mm", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
-        let candidates = screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| m.id == id);
-        let set = refit(&setting, &none, &candidates[0]).unwrap();
-        let gain = set.log_evidence - none.log_evidence;
-        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
-        (search.by_a_force(&none, &[set], candidates.len()), gain)
+        ask(&Search::new(setting, Options::default(), &Hooks::SILENT), &none)
+    }
+
+    /// What stands with this effect.
+    fn with<'d>(search: &Search<'_, 'd>, stands: &Hypothesis<'d>, id: &str) -> Hypothesis<'d> {
+        let (setting, base) = (&search.setting, &stands.base);
+        let candidates = screen(base, &setting.original, &stands.effects, &base.evidence(), &|m, _| m.id == id);
+        refit(setting, stands, &candidates[0]).unwrap()
     }
 
     #[test]
     fn a_random_force_on_what_sticks_is_no_effect() {
-        let (explained, gain) = axis(0.3, 0.0, "periodic_disturbance");
-        assert!(gain > 20.0 && explained.is_some_and(|p| p > Options::default().alpha), "{gain} {explained:?}");
+        let explained = |forces, cogging, id: &str| {
+            axis(forces, cogging, |search, none| {
+                let set = with(search, none, id);
+                let gain = set.log_evidence - none.log_evidence;
+                (search.by_a_force(none, &[set], CANDIDATES), gain)
+            })
+        };
+        let (by, gain) = explained(0.3, 0.0, "periodic_disturbance");
+        assert!(gain > 20.0 && by.is_some_and(|p| p > Options::default().alpha), "{gain} {by:?}");
         // A ripple of the motor is followed by such predictions too, and told far better by its own law.
-        let (explained, gain) = axis(0.0, 4.0, "cogging");
-        assert!(gain > 100.0 && explained.is_none(), "{gain} {explained:?}");
+        let (by, gain) = explained(0.0, 4.0, "cogging");
+        assert!(gain > 100.0 && by.is_none(), "{gain} {by:?}");
+    }
+
+    #[test]
+    fn nor_is_one_beside_an_effect() {
+        // What the wider set gains, what the force gains without it, and whether that explains the set.
+        let beside = |forces, first: &str, second: &str| {
+            axis(forces, 4.0, |search, none| {
+                let stands = with(search, none, first);
+                let set = with(search, &stands, second);
+                let gain = set.log_evidence - stands.log_evidence;
+                (gain, search.force_on(&stands), search.is_pushed_rather(&stands, &[set], CANDIDATES))
+            })
+        };
+        let (gain, force, explained) = beside(0.3, "cogging", "periodic_disturbance");
+        assert!(gain > 10.0 && force.is_some_and(|f| f > gain) && explained, "{gain} {force:?}");
+        // A ripple that is there gains less than the force, and as much beside it.
+        let (gain, force, explained) = beside(0.1, "asymmetric_friction", "cogging");
+        assert!(gain > 50.0 && force.is_some_and(|f| f > gain) && !explained, "{gain} {force:?}");
+        let (_, force, explained) = beside(0.0, "cogging", "periodic_disturbance");
+        assert!(force.is_none() && !explained, "{force:?}");
     }
 }

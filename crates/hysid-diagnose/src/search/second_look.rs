@@ -69,11 +69,9 @@ impl<'d> Search<'_, 'd> {
         candidates: usize,
     ) -> Option<(f64, &'h Hypothesis<'d>)> {
         let sets = |h: &Hypothesis<'_>| {
-            (0..h.effects.len())
-                .map(|i| {
-                    (candidates.saturating_sub(i) as f64 / (i + 1) as f64).max(1.0) * self.places_of(&h.effects[i])
-                })
-                .product::<f64>()
+            let added = h.effects.iter().filter(|e| !start.effects.iter().any(|known| known.states_the_same(e)));
+            let choices = |i: usize| (candidates.saturating_sub(i) as f64 / (i + 1) as f64).max(1.0);
+            added.enumerate().map(|(i, e)| choices(i) * self.places_of(e)).product::<f64>()
         };
         // A set that leaves white noise has no colour left to choose: it need not allow for those that noise may have.
         let spared_by = |h: &Hypothesis<'_>| {

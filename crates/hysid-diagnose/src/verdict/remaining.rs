@@ -49,6 +49,8 @@ pub struct Remaining<'d> {
     pub spectrum: bool,
     /// Whether something significant is left.
     pub imperfect: bool,
+    /// Whether an unknown force that acts on the machine explains what is left.
+    pub pushed: bool,
     alpha: f64,
 }
 
@@ -59,8 +61,16 @@ impl<'d> Remaining<'d> {
         let alpha = search.options.alpha;
         let budget = search.setting.budget;
         let test = (winner > 0 && !budget.omits(Step::Remains)).then(|| search.remains(best));
-        let open = if significant { search.open(best) } else { None };
-        let seen = open.as_ref().filter(|o| o.by_chance(ODDS_AGAINST_MORE) < alpha);
+        let mut open = if significant { search.open(best) } else { None };
+        let told = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha;
+        let seen = open.as_ref().is_some_and(told) || test.as_ref().is_some_and(|t| t.tells(alpha));
+        // A score is twice a gain in log likelihood.
+        let most = open.as_ref().map_or(0.0, |o| o.gain).max(0.5 * test.as_ref().map_or(0.0, |t| t.statistic));
+        let pushed = winner > 0 && seen && search.force_on(best).is_some_and(|force| most < force);
+        if pushed {
+            open = None;
+        }
+        let seen = open.as_ref().filter(|o| told(o));
         let explained = best.log_evidence - none.log_evidence;
         let spectrum = is_a_spectrum(best);
         let imitates = winner > 0 && best.base.unexplained() > HARDLY_ANY.powi(2) * none.base.unexplained();
@@ -68,7 +78,7 @@ impl<'d> Remaining<'d> {
         let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
         let outdone = imitates && generic.as_ref().is_some_and(outdone);
         // What was not looked at is not known to be nothing.
-        let left = seen.is_some() || test.as_ref().is_none_or(|t| t.tells(alpha));
+        let left = seen.is_some() || test.as_ref().is_none_or(|t| t.tells(alpha) && !pushed);
         // One law that leaves nothing is no imitation that generic terms could tell from it but by their price.
         let doubtful = imitates && (left || best.effects.len() > 1);
         let (swapped, tried) =
@@ -79,12 +89,12 @@ impl<'d> Remaining<'d> {
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
         let instead = generic.filter(|g| spectrum || (outdone && swapped.is_none() && g.gain > both));
-        Self { test, open, instead, swapped, tried, written: None, foreign, spectrum, imperfect, alpha }
+        Self { test, open, instead, swapped, tried, written: None, foreign, spectrum, imperfect, pushed, alpha }
     }
 
     /// As it is reported; `None` where it was not looked at.
     pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> Option<RemainingRecord> {
-        let p = self.test.as_ref()?.p_value;
+        let p = self.test.as_ref().map(|t| if self.pushed { 1.0 } else { t.p_value })?;
         Some(RemainingRecord {
             p_value: p.min(self.open.as_ref().map_or(1.0, |o| o.by_chance(ODDS_AGAINST_MORE))),
             share: share(&pool[winner], &pool[0]),
@@ -97,7 +107,9 @@ impl<'d> Remaining<'d> {
         let Some(remaining) = remaining else { return self.open.as_ref().is_some_and(|o| self.stands(o)) };
         let helps = self.open.as_ref().is_some_and(|o| o.block_ratio < BETTER);
         let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
-        self.foreign || self.spectrum || (helps && most && self.test.as_ref().is_some_and(|t| t.tells(self.alpha)))
+        self.foreign
+            || self.spectrum
+            || (helps && most && !self.pushed && self.test.as_ref().is_some_and(|t| t.tells(self.alpha)))
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set, where that is `trusted` on other inputs, or in its
