@@ -27,13 +27,13 @@ pub struct SearchOptions {
 /// What composition asks of the search that it is a part of.
 pub struct Ask<'a, 'd> {
     /// Whether something significant is left of a hypothesis' residual.
-    pub unexplained: &'a dyn Fn(&Hypothesis<'d>) -> bool,
+    pub unexplained: &'a (dyn Fn(&Hypothesis<'d>) -> bool + Sync),
     /// What could be missing around a hypothesis.
-    pub around: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
+    pub around: &'a (dyn Fn(&Hypothesis<'d>) -> Vec<Candidate> + Sync),
     /// Effects that its noise model may have taken for noise.
-    pub absorbed: &'a dyn Fn(&Hypothesis<'d>) -> Vec<Candidate>,
+    pub absorbed: &'a (dyn Fn(&Hypothesis<'d>) -> Vec<Candidate> + Sync),
     /// The hypothesis under white noise, with what could be missing around it there; `None` where its noise is white.
-    pub plainly: &'a dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)>,
+    pub plainly: &'a (dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> + Sync),
     /// Whether an unknown force on the machine explains what sets of more effects add to one that stands.
     pub pushed: &'a dyn Fn(&Hypothesis<'d>, &[Hypothesis<'d>]) -> bool,
 }
@@ -123,15 +123,18 @@ pub fn compose<'d>(
         if !more {
             found.extend(unseen(setting, &pool[standing], &around(&pool[standing])));
         }
-        for p in parents {
+        let beside = |parent: &Hypothesis<'d>| {
             if enough() {
-                break;
+                return Vec::new();
             }
+            let mut found = Vec::new();
             if more {
-                found.extend(extended(setting, &pool[p], &around(&pool[p]), options, None));
+                found.extend(extended(setting, parent, &around(parent), options, None));
             }
-            found.extend(refit_all(setting, &pool[p], &absorbed(&pool[p]).iter().collect::<Vec<_>>()));
-        }
+            found.extend(refit_all(setting, parent, &absorbed(parent).iter().collect::<Vec<_>>()));
+            found
+        };
+        found.par_extend(parents.into_par_iter().map(|p| &pool[p]).flat_map_iter(beside));
         if found.is_empty() {
             break;
         }
@@ -159,21 +162,23 @@ pub fn compose<'d>(
         }
         let (before, evidence) = (pool[best].key(), pool[best].log_evidence);
         let rests: Vec<(usize, Hypothesis<'d>)> =
-            (0..n).filter_map(|index| Some((index, without(setting, none, &pool[best], index)?))).collect();
+            (0..n).into_par_iter().filter_map(|i| Some((i, without(setting, none, &pool[best], i)?))).collect();
         // What remains may come to rest where it had not come alone: then the other was no more than the way there.
         if rests.iter().any(|(_, rest)| rest.log_evidence > evidence - LEAST_GAIN) {
             rests.into_iter().for_each(|(_, rest)| add(pool, rest));
             continue;
         }
-        let mut found = Vec::new();
-        for (index, rest) in &rests {
+        let set = &pool[best];
+        let instead = |(index, rest): &(usize, Hypothesis<'d>)| {
             if enough() {
-                break;
+                return Vec::new();
             }
             let candidates = around(rest);
-            found.extend(swapped(setting, none, &pool[best], *index, &candidates));
-            found.extend(extended(setting, rest, &candidates, options, Some(&pool[best].effects[*index])));
-        }
+            let mut found = swapped(setting, none, set, *index, &candidates);
+            found.extend(extended(setting, rest, &candidates, options, Some(&set.effects[*index])));
+            found
+        };
+        let mut found: Vec<Hypothesis<'d>> = rests.par_iter().flat_map_iter(instead).collect();
         found.extend(rests.into_iter().map(|(_, rest)| rest));
         for h in found {
             add(pool, h);
@@ -224,15 +229,17 @@ fn beside_the_second<'d>(
     if pool[second].log_evidence < pool[best].log_evidence - NEARLY {
         return;
     }
-    let mut found = Vec::new();
-    for index in 0..effects {
+    let set = &pool[second];
+    let instead = |index: usize| {
         if setting.budget.omits(Step::Composition) {
-            break;
+            return Vec::new();
         }
-        let Some(rest) = without(setting, none, &pool[second], index) else { continue };
-        found.extend(swapped(setting, none, &pool[second], index, &(ask.around)(&rest)));
+        let Some(rest) = without(setting, none, set, index) else { return Vec::new() };
+        let mut found = swapped(setting, none, set, index, &(ask.around)(&rest));
         found.push(rest);
-    }
+        found
+    };
+    let found: Vec<Hypothesis<'d>> = (0..effects).into_par_iter().flat_map_iter(instead).collect();
     found.into_iter().for_each(|h| add(pool, h));
 }
 

@@ -4,6 +4,8 @@
 //! follows a smooth one at a lower price and beyond what the recording reached; six weights follow one that stands far above the noise, where
 //! what three leave would pass for another effect. The evidence decides, so that no recording pays for terms that it cannot tell.
 
+use rayon::prelude::*;
+
 use super::assemble::{Part, assemble};
 use super::finish::finish;
 use super::screen::rewrite_at;
@@ -43,8 +45,7 @@ pub fn finer<'d>(
     let effect = h.effects.get(index)?;
     let present = effect.mechanism.law_at(&effect.slot, effect.written.purpose);
     let now = unknowns(&present);
-    let mut forms: Vec<Hypothesis<'d>> = Vec::new();
-    for (purpose, law) in effect.mechanism.forms(&effect.slot) {
+    let in_form = |(purpose, law): (Purpose, Law)| {
         let own = unknowns(&law);
         let worth = match purpose {
             Purpose::Form(Form::FinerUnsettled) => PLAIN_TO_SEE,
@@ -52,13 +53,15 @@ pub fn finer<'d>(
             _ => WORTH_RECASTING - UNKNOWN * (now - own) as f64,
         };
         if purpose == effect.written.purpose || h.log_evidence < trunk.log_evidence + worth {
-            continue;
+            return None;
         }
         if setting.budget.omits(Step::Fits) {
-            break;
+            return None;
         }
-        forms.extend(written_as(setting, trunk, h, index, &present, (purpose, &law)));
-    }
+        written_as(setting, trunk, h, index, &present, (purpose, &law))
+    };
+    let mut forms: Vec<Hypothesis<'d>> =
+        effect.mechanism.forms(&effect.slot).into_par_iter().filter_map(in_form).collect();
     let merits: Vec<(f64, f64)> =
         std::iter::once(h).chain(&forms).map(|f| (f.log_evidence, f.base.log_likelihood)).collect();
     // In the list of merits the present form is the first.
@@ -116,7 +119,8 @@ fn written_as<'d>(
         }
     }
     let every = starts.len().div_ceil(MOST_STARTS).max(1);
-    let begun = starts.into_iter().step_by(every).filter_map(|start| {
+    let starts: Vec<_> = starts.into_iter().step_by(every).collect();
+    let begun = starts.into_par_iter().filter_map(|start| {
         let mut parts: Vec<Part> = h.effects[first..].iter().map(|e| Part::of_effect(e, &values)).collect();
         parts[index - first] = Part { purpose, values: start, ..Part::of_effect(effect, &values) };
         assemble(setting, trunk, &values, &parts, &h.base.whitener, SKETCH)

@@ -28,8 +28,8 @@ pub mod simpler;
 pub mod starts;
 pub mod tracked;
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
@@ -102,17 +102,17 @@ pub struct Search<'a, 'd> {
     /// Progress and time.
     pub hooks: &'a Hooks<'a>,
     /// Tests of what remains, by statement: composition and the verdict ask for the same ones.
-    tests: RefCell<BTreeMap<Key, SurrogateTest>>,
+    tests: Mutex<BTreeMap<Key, SurrogateTest>>,
     /// What could be missing around the hypothesis that was tested last: composition mostly extends that one next.
-    screened: RefCell<Option<(Key, Vec<Candidate>)>>,
+    screened: Mutex<Option<(Key, Vec<Candidate>)>>,
     /// Generic terms, by statement: the second look, composition, the verdict and the correction ask for the same ones.
-    open: RefCell<BTreeMap<Key, Option<OpenSet>>>,
+    open: Mutex<BTreeMap<Key, Option<OpenSet>>>,
 }
 
 impl<'a, 'd> Search<'a, 'd> {
     /// A search that has found nothing yet.
     pub fn new(setting: Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
-        let (tests, screened, open) = (RefCell::default(), RefCell::default(), RefCell::default());
+        let (tests, screened, open) = (Mutex::default(), Mutex::default(), Mutex::default());
         Self { setting, options, hooks, tests, screened, open }
     }
 
@@ -185,7 +185,7 @@ impl<'a, 'd> Search<'a, 'd> {
             Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed, plainly: &plainly, pushed: &pushed };
         compose(&self.setting, none, candidates, pool, bounds, &hear);
         keep_explaining(none, pool);
-        self.screened.take();
+        held(&self.screened).take();
     }
 
     /// The likeliest of these sets, which were found under another noise model, fitted under this search's.
@@ -222,30 +222,33 @@ impl<'a, 'd> Search<'a, 'd> {
 
     /// Generic terms for what is left of a hypothesis' residual.
     pub fn open(&self, h: &Hypothesis<'_>) -> Option<OpenSet> {
-        let found = || correction(&h.base, self.setting.noise);
-        self.open.borrow_mut().entry(fitted_key(h)).or_insert_with(found).clone()
+        let key = fitted_key(h);
+        if let Some(known) = held(&self.open).get(&key) {
+            return known.clone();
+        }
+        let found = correction(&h.base, self.setting.noise);
+        held(&self.open).insert(key, found.clone());
+        found
     }
 
     /// The test of what remains of a hypothesis' residual.
     pub fn remains(&self, h: &Hypothesis<'_>) -> SurrogateTest {
         let key = fitted_key(h);
-        if let Some(known) = self.tests.borrow().get(&key) {
+        if let Some(known) = held(&self.tests).get(&key) {
             return known.clone();
         }
         let evidence = h.base.evidence();
         let rest = self.setting.lacking(h, &evidence);
         let test = self.test(&rest, &h.base, &evidence);
-        self.tests.borrow_mut().insert(key.clone(), test.clone());
-        *self.screened.borrow_mut() = Some((key, rest));
+        held(&self.tests).insert(key.clone(), test.clone());
+        *held(&self.screened) = Some((key, rest));
         test
     }
 
     /// What could be missing around a hypothesis.
     fn around(&self, h: &Hypothesis<'_>) -> Vec<Candidate> {
-        let mut found = match self.screened.borrow_mut().take() {
-            Some((key, found)) if key == fitted_key(h) => found,
-            _ => self.setting.lacking(h, &h.base.evidence()),
-        };
+        let known = held(&self.screened).take_if(|(key, _)| *key == fitted_key(h));
+        let mut found = known.map_or_else(|| self.setting.lacking(h, &h.base.evidence()), |(_, candidates)| candidates);
         tracked::include(&mut found, tracked::along_the_recording(&self.setting, h));
         found
     }
@@ -300,6 +303,11 @@ impl<'a, 'd> Search<'a, 'd> {
             quick.chain(groups_of(true).map(|group| Contender { group, handicap })).collect();
         surrogate_test(&groups, layout, own, r, options)
     }
+}
+
+/// What a search holds, whoever asks.
+fn held<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The statement of a hypothesis with its evidence: a better fit of the same statement is looked at anew.
