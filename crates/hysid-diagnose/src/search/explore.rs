@@ -1,12 +1,12 @@
 //! Everything that is looked for on one calibration: test, second look, refits, composition, the sets that were asked for.
 
-use super::Search;
 use super::compose::{add, best_of};
 use super::detectable::detectability;
 use super::prediction::parts;
 use super::rounding::rounded;
 use super::screen::Candidate;
 use super::tracked;
+use super::{Search, leaves_more};
 use crate::budget::Step;
 use crate::calibration::fair::recalibrated;
 use crate::calibration::lesson::{Done, Lesson, lesson};
@@ -149,6 +149,7 @@ pub fn explore<'a, 'd>(
     }
     // Plain squares take what a random force does for mismatch, also where the simulation is linear.
     let mut forced = None;
+    let mut set_aside = None;
     if significant && let Some((start, found)) = gross.take() {
         plainly.singles(&start, &found, &mut pool);
         if let Some(lesson) = learned(&plainly, &start, &pool, Done::Singles) {
@@ -158,7 +159,7 @@ pub fn explore<'a, 'd>(
         let sets = search.under_noise(&none, &pool);
         let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
         if fine {
-            pool = sets;
+            set_aside = Some((start, found, std::mem::replace(&mut pool, sets)));
         } else {
             forced = search.by_a_force(&none, &sets, found.len());
             significant = forced.is_none();
@@ -171,6 +172,13 @@ pub fn explore<'a, 'd>(
             return again(lesson);
         }
         search.combine(&none, &candidates, &mut pool);
+        // A noise model under which the best set explains nothing has taken the mismatch for noise: plain squares decide after all.
+        if let Some((start, found, sets)) = set_aside
+            && best_of(&pool).is_some_and(|best| leaves_more(&pool[best], &start))
+        {
+            pool = sets;
+            gross = Some((start, found));
+        }
     }
     let least = under_white.map(|(start, _)| start);
     let (search, none) = match gross {
