@@ -139,6 +139,7 @@ pub fn compose<'d>(
             break;
         }
         let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+        // What moves the machine at random is in its free run, where further effects take some of it, one after the other.
         if reached >= best + LEAST_GAIN && (ask.pushed)(&pool[standing], &found) {
             break;
         }

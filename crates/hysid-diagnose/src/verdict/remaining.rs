@@ -63,10 +63,10 @@ impl<'d> Remaining<'d> {
         let test = (winner > 0 && !budget.omits(Step::Remains)).then(|| search.remains(best));
         let mut open = if significant { search.open(best) } else { None };
         let told = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha;
-        let seen = open.as_ref().is_some_and(told) || test.as_ref().is_some_and(|t| t.tells(alpha));
+        let any = open.as_ref().is_some_and(told) || test.as_ref().is_some_and(|t| t.tells(alpha));
         // A score is twice a gain in log likelihood.
         let most = open.as_ref().map_or(0.0, |o| o.gain).max(0.5 * test.as_ref().map_or(0.0, |t| t.statistic));
-        let pushed = winner > 0 && seen && search.force_on(best).is_some_and(|force| most < force);
+        let pushed = winner > 0 && any && search.force_on(best).is_some_and(|force| most < force);
         if pushed {
             open = None;
         }
