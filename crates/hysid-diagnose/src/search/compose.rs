@@ -27,13 +27,13 @@ pub struct SearchOptions {
 /// What composition asks of the search that it is a part of.
 pub struct Ask<'a, 'd> {
     /// Whether something significant is left of a hypothesis' residual.
-    pub unexplained: &'a (dyn Fn(&Hypothesis<'d>) -> bool + Sync),
+    pub unexplained: &'a dyn Fn(&Hypothesis<'d>) -> bool,
     /// What could be missing around a hypothesis.
     pub around: &'a (dyn Fn(&Hypothesis<'d>) -> Vec<Candidate> + Sync),
     /// Effects that its noise model may have taken for noise.
     pub absorbed: &'a (dyn Fn(&Hypothesis<'d>) -> Vec<Candidate> + Sync),
     /// The hypothesis under white noise, with what could be missing around it there; `None` where its noise is white.
-    pub plainly: &'a (dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> + Sync),
+    pub plainly: &'a dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)>,
     /// Whether an unknown force on the machine explains what sets of more effects add to one that stands.
     pub pushed: &'a dyn Fn(&Hypothesis<'d>, &[Hypothesis<'d>]) -> bool,
 }

@@ -52,10 +52,8 @@ pub fn finer<'d>(
             _ if own > now => WORTH_REFINING,
             _ => WORTH_RECASTING - UNKNOWN * (now - own) as f64,
         };
-        if purpose == effect.written.purpose || h.log_evidence < trunk.log_evidence + worth {
-            return None;
-        }
-        if setting.budget.omits(Step::Fits) {
+        let tried = purpose != effect.written.purpose && h.log_evidence >= trunk.log_evidence + worth;
+        if !tried || setting.budget.omits(Step::Fits) {
             return None;
         }
         written_as(setting, trunk, h, index, &present, (purpose, &law))

@@ -75,7 +75,7 @@ impl<'d> Remaining<'d> {
         let spectrum = is_a_spectrum(best);
         let imitates = winner > 0 && best.base.unexplained() > HARDLY_ANY.powi(2) * none.base.unexplained();
         let generic = if imitates || spectrum { search.open(none) } else { None };
-        let outdone = |o: &OpenSet| o.by_chance(ODDS_AGAINST_MORE) < alpha && o.gain > explained + FAR_MORE;
+        let outdone = |o: &OpenSet| told(o) && o.gain > explained + FAR_MORE;
         let outdone = imitates && generic.as_ref().is_some_and(outdone);
         // What was not looked at is not known to be nothing.
         let left = seen.is_some() || test.as_ref().is_none_or(|t| t.tells(alpha) && !pushed);
@@ -107,9 +107,7 @@ impl<'d> Remaining<'d> {
         let Some(remaining) = remaining else { return self.open.as_ref().is_some_and(|o| self.stands(o)) };
         let helps = self.open.as_ref().is_some_and(|o| o.block_ratio < BETTER);
         let most = remaining.share > 0.5 || (remaining.share > 0.2 && support.iter().all(|s| s.family < FIRM));
-        self.foreign
-            || self.spectrum
-            || (helps && most && !self.pushed && self.test.as_ref().is_some_and(|t| t.tells(self.alpha)))
+        self.foreign || self.spectrum || (helps && most && self.test.as_ref().is_some_and(|t| t.tells(self.alpha)))
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set, where that is `trusted` on other inputs, or in its
