@@ -9,10 +9,10 @@ use super::measure::{Outcome, Spread};
 pub fn renew(page: &str, name: &str, block: &str) -> String {
     let (begin, end) = (format!("<!-- measured: {name} -->"), format!("<!-- end of {name} -->"));
     let whole = format!("{begin}\n{block}{end}");
-    if let Some((before, rest)) = page.split_once(&begin) {
-        if let Some((_, after)) = rest.split_once(&end) {
-            return format!("{before}{whole}{after}");
-        }
+    if let Some((before, rest)) = page.split_once(&begin)
+        && let Some((_, after)) = rest.split_once(&end)
+    {
+        return format!("{before}{whole}{after}");
     }
     let last = page.rfind("<!-- end of ").and_then(|at| Some(at + page[at..].find("-->")? + 3)).unwrap_or(page.len());
     format!("{}\n\n{whole}{}", page[..last].trim_end(), &page[last..])

@@ -60,7 +60,7 @@ impl Observation {
 /// Runs the task.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let files = if args.files.is_empty() { stored()? } else { args.files.clone() };
-    let banks: Vec<Vec<Observation>> = files.iter().map(|f| read(f)).collect::<anyhow::Result<_>>()?;
+    let banks: Vec<Vec<Observation>> = files.iter().map(read).collect::<anyhow::Result<_>>()?;
     ensure!(banks.len() > 1, "at least two files of statements are needed, so that one can be left out");
     print!("{}", report(&banks));
     Ok(())

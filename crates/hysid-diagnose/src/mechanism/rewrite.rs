@@ -36,7 +36,7 @@ fn product_of_units(slot: &Slot, measure: &Expr) -> Option<Unit> {
         Expr::Binary(Mul, a, b) => Some(product_of_units(slot, a)?.times(&product_of_units(slot, b)?)),
         Expr::Binary(Div, a, b) => Some(product_of_units(slot, a)?.per(&product_of_units(slot, b)?)),
         Expr::Binary(Pow, a, b) => match **b {
-            Expr::Number(n) if n == 0.5 => product_of_units(slot, a)?.root(),
+            Expr::Number(0.5) => product_of_units(slot, a)?.root(),
             Expr::Number(n) if n.fract() == 0.0 && n.abs() < 9.0 => Some(product_of_units(slot, a)?.power(n as i32)),
             _ => None,
         },

@@ -108,10 +108,8 @@ impl Finder<'_> {
             slot.offer(self.simulation, "control", control);
         }
         self.offer_motion(&mut slot, motion);
-        if let Some(x) = motion.x {
-            if let Some(rad) = self.simulation.unit_of(x).as_ref().and_then(angle) {
-                slot.offer(self.simulation, "rad", rad);
-            }
+        if let Some(rad) = motion.x.and_then(|x| self.simulation.unit_of(x).as_ref().and_then(angle)) {
+            slot.offer(self.simulation, "rad", rad);
         }
         if let Some(turn) = motion.turn.and_then(|turn| self.simulation.state(turn)) {
             let rad = linear_coefficient(self.simulation, &turn.derivative, motion.v);

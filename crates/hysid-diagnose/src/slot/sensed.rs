@@ -121,7 +121,7 @@ fn shaken(e: &Expr, round: u64) -> Expr {
     let held = e.clone().map(&mut |e| match e {
         Expr::Binary(BinaryOp::Pow, a, b) if matches!(*b, Expr::Number(_)) => {
             exponents.push(*b);
-            Expr::Binary(BinaryOp::Pow, a, Box::new(Expr::symbol(&format!("?{}", exponents.len() - 1))))
+            Expr::Binary(BinaryOp::Pow, a, Box::new(Expr::symbol(format!("?{}", exponents.len() - 1))))
         }
         other => other,
     });

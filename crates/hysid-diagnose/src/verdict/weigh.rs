@@ -266,6 +266,8 @@ pub fn log_weights(
 
 #[cfg(test)]
 mod tests {
+    use std::slice::from_ref;
+
     use hysid_plant::Simulation;
 
     use super::*;
@@ -300,7 +302,7 @@ mod tests {
         let set = |claims: &[Claim]| Weighed { claims: claims.to_vec(), log_evidence: 0.0 };
         let (pinching, dahl) = (claim("pinching", "hysteretic_spring"), claim("dahl_friction", "presliding"));
         let (lugre, delay) = (claim("lugre_friction", "presliding"), claim("delay", "signal_path_lag"));
-        let alone = [set(&[pinching.clone()]), set(&[dahl.clone()]), set(&[lugre])];
+        let alone = [set(from_ref(&pinching)), set(from_ref(&dahl)), set(&[lugre])];
         let told = |p: [f64; 3]| likeliest_families(&[0, 1], 0, &alone, &p);
         assert_eq!(told([0.4, 0.3, 0.3]), ["presliding"]);
         assert_eq!(told([0.6, 0.2, 0.2]), ["hysteretic_spring"]);

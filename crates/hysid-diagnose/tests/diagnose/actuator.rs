@@ -139,7 +139,8 @@ fn a_loop_that_widens_with_the_rate_of_a_rough_input_is_followed() {
 fn backlash_is_firm_only_where_the_input_turns_often_enough() {
     // Straight lines up and down, each somewhat shorter than the one before.
     let zigzag = |lines: usize| -> Vec<f64> {
-        let corner = |k: usize| 30.0 * (1.0 - 0.4 * k as f64 / lines as f64) * if k % 2 == 0 { -1.0 } else { 1.0 };
+        let corner =
+            |k: usize| 30.0 * (1.0 - 0.4 * k as f64 / lines as f64) * if k.is_multiple_of(2) { -1.0 } else { 1.0 };
         let at = |i: usize| {
             let place = i as f64 * lines as f64 / 1200.0;
             let (k, part) = (place.floor() as usize, place.fract());

@@ -99,7 +99,7 @@ fn pulled(name: &str, seed: u64, n: usize) -> Recording {
 fn a_static_simulation_is_stepped_finely_enough_for_the_memory_that_an_effect_adds() {
     let text = "[time]\nperiod_s = 0.025\n[inputs]\nx = \"x_m\"\n[parameters]\nk = { value = 45.0, min = 1.0, max = 200.0, unit = \"N/m\" }\n[outputs]\nf_N = \"k*x\"\n";
     let holdout = pulled("val.csv", 2, 900);
-    let d = run(text, &[pulled("est.csv", 1, 900)], &[holdout.clone()]).unwrap();
+    let d = run(text, &[pulled("est.csv", 1, 900)], std::slice::from_ref(&holdout)).unwrap();
     let families: Vec<&str> = d.file.effects.iter().map(|e| e.family.as_str()).collect();
     assert_eq!(families, ["presliding"], "{}", d.file.summary);
     // What is told of the hold-out holds in the simulation that is written, however finely that is integrated.

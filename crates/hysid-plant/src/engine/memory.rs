@@ -240,7 +240,7 @@ impl<N: Number> Cell<N> {
         }
         let wanted = since.value();
         match self.decays {
-            [Some(known), _] | [_, Some(known)] if known.since == wanted => return known,
+            [Some(known), _] | [_, Some(known)] if known.since == wanted => known,
             _ => self.met(since, tau),
         }
     }

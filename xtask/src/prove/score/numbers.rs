@@ -97,11 +97,11 @@ pub fn shared(r: &Row) -> Vec<Shared> {
         for (mechanism, ours, theirs) in SAME_NUMBER {
             let truth = e.parameters.iter().find(|p| p.0 == *ours).map(|p| p.1.abs());
             let found = s.parameters.iter().find(|p| p.0 == *theirs);
-            if let (true, Some(truth), Some(&(_, value, low, high))) = (*mechanism == e.mechanism, truth, found) {
-                if truth > 0.0 {
-                    let (low, high) = if value < 0.0 { (-high, -low) } else { (low, high) };
-                    list.push(Shared { name: format!("{mechanism}.{theirs}"), truth, told: (value.abs(), low, high) });
-                }
+            if let (true, Some(truth), Some(&(_, value, low, high))) = (*mechanism == e.mechanism, truth, found)
+                && truth > 0.0
+            {
+                let (low, high) = if value < 0.0 { (-high, -low) } else { (low, high) };
+                list.push(Shared { name: format!("{mechanism}.{theirs}"), truth, told: (value.abs(), low, high) });
             }
         }
     }
