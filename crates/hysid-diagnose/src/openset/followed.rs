@@ -95,6 +95,7 @@ mod tests {
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::openset::course::Course;
+    use crate::openset::modulation::modulated;
     use crate::openset::varying::{Varying, varying};
     use crate::openset::written::with_course;
     use crate::oscillator::{normal, rms};
@@ -138,5 +139,39 @@ mod tests {
         let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
         assert_eq!((found.symbol.as_str(), input.symbol.as_str(), input.way), ("f", "i", Way::Curved));
         assert!(answers && found.words().contains("along a curve"), "{}", found.words());
+    }
+
+    /// As the time of transport through a pipe does the flow.
+    #[test]
+    fn a_delay_may_follow_an_input_beside_a_lag_that_stands_still() {
+        let text = "[time]\nperiod_s = 0.1\n[inputs]\nu = \"u_K\"\nq = \"flow_l_s\"\n[parameters]\ng = { value = 1.0, min = 0.1, max = 9.0 }\nT = { value = 1.3, min = 0.5, max = 3.0, unit = \"s\" }\n\
+                    tau = { value = 0.4, min = 0.05, max = 2.0, unit = \"s\" }\n[outputs]\ny_K = \"g*lag(delay(u, T), tau) + 0*q\"\n";
+        let simulation = Simulation::parse(text, "pipe.sim.toml").unwrap();
+        let tones = [(1.0, 0.9, 0.3), (0.8, 1.7, 1.1), (0.5, 2.9, 2.0)];
+        let u = |t: f64| tones.iter().map(|(a, w, p)| a * (w * t + p).sin()).sum::<f64>();
+        let times: Vec<f64> = (0..1200).map(|n| 0.1 * f64::from(n)).collect();
+        let q: Vec<f64> = times.iter().map(|t| 2.0 + (0.23 * t).sin()).collect();
+        let mut random = normal(8);
+        // The lag of 0.3 s, by small steps.
+        let mut state = u(0.0);
+        let mut y = Vec::new();
+        for (t, q) in times.iter().zip(&q) {
+            let late = 1.0 * (1.0 - 0.06 * (q - 2.0));
+            (0..20).for_each(|k| state += 0.005 / 0.3 * (u((t - 0.1 + 0.005 * f64::from(k) - late).max(0.0)) - state));
+            y.push(2.0 * state + 0.02 * random());
+        }
+        let data =
+            recorded(&simulation, 0.1, [("u_K", times.iter().map(|t| u(*t)).collect()), ("flow_l_s", q), ("y_K", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(simulation, &data, NoiseKind::Coloured, &budget);
+        let base = none.base;
+        assert_eq!(modulated(&base), ["g", "T"]);
+        let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
+        let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
+        assert_eq!((found.symbol.as_str(), input.symbol.as_str()), ("T", "q"), "{}", found.words());
+        let written = with_course(&base.document(), &found).unwrap();
+        let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
+        let left = [&fit.fit, &base.fit].map(|f| rms(&f.residual));
+        assert!(found.gain > 20.0 && left[0] < 0.5 * left[1], "{} {left:?}", found.gain);
     }
 }

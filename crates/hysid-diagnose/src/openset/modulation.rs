@@ -3,7 +3,7 @@
 //! The response to a signal at such an input is the derivative by the modulation's amplitude, exactly, wherever the parameter stands; the adjoint
 //! gives the score of a modulation at every instant.
 
-use hysid_plant::{Expr, Input, Simulation, Slot as Place};
+use hysid_plant::{Compiled, Expr, Input, Memory, Simulation, Slot as Place};
 use rayon::prelude::*;
 
 use crate::data::DataSet;
@@ -20,7 +20,7 @@ const MOST: usize = 12;
 const INSTANTS: usize = 24;
 const CONSTANT: f64 = 1e-6;
 
-/// What can be modulated: a parameter or an input, by its symbol.
+/// What can be modulated: a parameter or an input, by its symbol. What an operator with memory needs to stand still (the time constant of a `lag`) cannot.
 pub fn modulated(base: &Base<'_>) -> Vec<String> {
     let simulation = base.model.simulation();
     let values = base.values();
@@ -31,14 +31,42 @@ pub fn modulated(base: &Base<'_>) -> Vec<String> {
         .filter(|name| values.parameters.get(*name).is_some_and(|v| *v != 0.0))
         .map(str::to_owned)
         .chain(inputs)
+        .filter(|symbol| {
+            let mut document = simulation.clone();
+            modulate(&mut document, symbol);
+            Compiled::new(&document).is_ok()
+        })
         .take(MOST)
         .collect()
 }
 
-/// Multiplies a symbol in every equation.
+/// Multiplies a symbol in every equation; the time by which inputs are delayed, which has to stand still, to first order: `delay(u, T)` becomes
+/// `delay(u, T) - (factor - 1)*T*delay(d(u), T)`.
 pub fn multiply(simulation: &mut Simulation, symbol: &str, factor: &Expr) {
-    let by = Expr::symbol(symbol) * factor.clone();
-    simulation.map_equations(|e| e.substitute(symbol, &by));
+    let (own, by) = (Expr::symbol(symbol), Expr::symbol(symbol) * factor.clone());
+    let inputs: Vec<String> = simulation.inputs.iter().map(|u| u.symbol.clone()).collect();
+    let recorded = |w: &Expr| !w.has_memory() && w.symbols().iter().all(|s| inputs.contains(s));
+    // Under another name while delays are looked at: in them it is meant to stay.
+    let mark = Expr::symbol(simulation.fresh_symbol("varying"));
+    let later = |e: Expr| match &e {
+        Expr::Memory(Memory::Delay, arguments) => match arguments.as_slice() {
+            [w, seconds] if recorded(w) && seconds.replace(&mark, &own) != *seconds => {
+                let still = seconds.replace(&mark, &own);
+                let more = seconds.replace(&mark, &by) - still.clone();
+                w.clone().delay(still.clone()) - more * w.clone().derivative_of_input().delay(still)
+            }
+            _ => e,
+        },
+        _ => e,
+    };
+    simulation.map_equations(|e| e.replace(&own, &mark).map(&mut &later).replace(&mark, &by));
+}
+
+/// Multiplies a symbol by one and a further input that is zero.
+fn modulate(simulation: &mut Simulation, symbol: &str) {
+    let name = simulation.fresh_symbol("modulation");
+    simulation.inputs.push(Input { symbol: name.clone(), column: name.clone() });
+    multiply(simulation, symbol, &(Expr::Number(1.0) + Expr::symbol(&name)));
 }
 
 /// The fitted simulation with a further input for each modulation.
@@ -55,11 +83,7 @@ impl<'d> Modulated<'d> {
         let mut document = base.document();
         let own = document.inputs.len();
         let places = (own..own + symbols.len()).collect();
-        for symbol in symbols {
-            let name = document.fresh_symbol("modulation");
-            document.inputs.push(Input { symbol: name.clone(), column: name.clone() });
-            multiply(&mut document, symbol, &(Expr::Number(1.0) + Expr::symbol(&name)));
-        }
+        symbols.iter().for_each(|symbol| modulate(&mut document, symbol));
         let model = Model::new(&document, data, base.model.substeps()).ok()?;
         let theta = model.theta(&base.values());
         Some(Self { model, theta, places })
@@ -78,7 +102,8 @@ impl<'d> Modulated<'d> {
                 let all: Vec<Vec<f64>> = points.iter().map(|p| column(p, i)).collect();
                 let size = all.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
                 let moved = |x: &Vec<f64>| x.iter().zip(&all[0]).any(|(a, b)| (a - b).abs() > CONSTANT * size);
-                all.iter().any(moved)
+                // What acts through the past only (a delay) is not seen at an instant, and does move.
+                size == 0.0 || all.iter().any(moved)
             })
             .collect()
     }
