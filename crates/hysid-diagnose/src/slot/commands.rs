@@ -118,6 +118,11 @@ fn commands_in<'e>(simulation: &Simulation, derivative: &'e Expr) -> Vec<&'e Exp
 /// The command that an actuator follows, where its state is one: `c` in `(c - a)/T` of a state `a`, of an input and fed-back states. What a winding feels of
 /// its motor's speed is no command: its own current stands there with the resistance.
 pub(super) fn followed<'e>(simulation: &Simulation, state: &'e State) -> Option<&'e Expr> {
+    followed_at_once(simulation, state).or_else(|| swung_to(simulation, state))
+}
+
+/// As [`followed`], of an actuator that lags.
+fn followed_at_once<'e>(simulation: &Simulation, state: &'e State) -> Option<&'e Expr> {
     let behind = match &state.derivative {
         Expr::Binary(BinaryOp::Div, behind, time) if only_parameters(simulation, time) => behind,
         Expr::Binary(BinaryOp::Mul, a, b) if only_parameters(simulation, a) => b,
@@ -127,6 +132,22 @@ pub(super) fn followed<'e>(simulation: &Simulation, state: &'e State) -> Option<
     let Expr::Binary(BinaryOp::Sub, command, own) = &**behind else { return None };
     let follows = **own == Expr::symbol(&state.name) && !command.uses(&state.name);
     (follows && closes_a_loop(simulation, command) && command.terms().len() > 1).then_some(command)
+}
+
+/// As [`followed`], of an actuator that swings, such as a valve with its cylinder: `c` in `w^2*(c - v) - 2*d*w*a`, where `a` is the rate of a speed `v` and
+/// `c` feeds back the way that it has gone. Between two parts on springs neither has the other's speed.
+fn swung_to<'e>(simulation: &Simulation, state: &'e State) -> Option<&'e Expr> {
+    let is_rate_of = |rate: &str, e: &State| e.derivative == Expr::symbol(rate);
+    let asked = |(sign, term): (f64, &'e Expr)| {
+        let Expr::Binary(BinaryOp::Mul, gain, behind) = term else { return None };
+        let Expr::Binary(BinaryOp::Sub, command, speed) = &**behind else { return None };
+        let Expr::Symbol(speed) = &**speed else { return None };
+        let swings = simulation.state(speed).is_some_and(|v| is_rate_of(&state.name, v));
+        let gone = simulation.states.iter().any(|x| is_rate_of(speed, x) && command.uses(&x.name));
+        let follows = sign > 0.0 && only_parameters(simulation, gain) && !command.uses(speed);
+        (swings && gone && follows && closes_a_loop(simulation, command)).then_some(&**command)
+    };
+    state.derivative.terms().into_iter().find_map(asked)
 }
 
 /// Whether this is a factor that an actuator has, and not the inverse of a mass before the forces themselves.
@@ -212,6 +233,24 @@ mod tests {
         assert_eq!(found("0.3*(r - psi - 14*w - de)"), whole("r - psi - 14*w"));
         // What reacts upon it is no controller.
         assert_eq!(found("(r - psi - 2*de)/T"), (None, None));
+    }
+
+    #[test]
+    fn a_valve_and_its_cylinder_swing_to_a_command() {
+        let found = |balance: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nr = \"ram_set_mm\"\n[parameters]\nK = {{ value = 56.0, min = 15.0 }}\nw = {{ value = 49.0, min = 25.0, unit = \"rad/s\" }}\n\
+                 [states]\nx = {{ derivative = \"v\", initial = 0.0, unit = \"mm\" }}\nv = {{ derivative = \"a\", initial = 0.0, unit = \"mm/s\" }}\n\
+                 a = {{ derivative = \"{balance}\", initial = 0.0, unit = \"mm/s^2\" }}\n[outputs]\nram_mm = \"x\"\n"
+            );
+            let slots = crate::slot::Structure::of(&Simulation::parse(&text, "press.sim.toml").unwrap()).slots;
+            let commands = slots.iter().filter(|s| s.place == Place::Command);
+            let commands: Vec<String> = commands.map(|s| s.quantity("u").unwrap().expression.to_string()).collect();
+            (commands, slots.iter().any(|s| s.place == Place::Connection))
+        };
+        assert_eq!(found("w^2*(0.2*K*(r - x) - v) - 0.7*w*a"), (vec!["0.2*K*(r - x)".to_owned()], false));
+        // A valve that is driven from outside closes no loop.
+        assert_eq!(found("w^2*(0.2*K*r - v) - 0.7*w*a"), (Vec::new(), false));
     }
 
     /// The slots for commands of a motor's winding with this balance of voltages: what each replaces, and whether a speed could be felt there.

@@ -47,7 +47,8 @@ impl Finder<'_> {
 
     /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too: `0.001` of a road in mm.
     fn travel(&self, one: &Motion<'_>, x: &str, input: &str) -> Option<Expr> {
-        if self.kinematic_input(input) != Kinematic::Displacement {
+        // The rate of an acceleration balances no forces: what stands there is a servo's.
+        if self.kinematic_input(input) != Kinematic::Displacement || one.state != one.v {
             return None;
         }
         forces_of(self.simulation, one).find_map(|(_, term)| {
