@@ -11,7 +11,7 @@ pub static QUADRATIC_DAMPING: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("v"),
     already: &["v*abs(v)", "v^2*sign(v)"],
-    law: |_, _| Law::force("c_2*v*abs(v)").amplitude("c_2", "F/v^2", -0.5, 2.0),
+    law: |_, _| Law::force("c_2*v*abs(v)").amplitude("c_2", "F/v^2", 0.0, 2.0),
     contains: &[],
     confusable: &["displacement_dependent_damping", "power_law_damping", "coulomb_friction"],
     needs: &[Need::Levels("v", 1.5)],
