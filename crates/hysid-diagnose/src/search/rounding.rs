@@ -6,6 +6,7 @@
 //!
 //! Reference: B. Widrow, I. Kollár, Quantization Noise, Cambridge University Press (2008), ch. 1.
 
+use hysid_plant::{Compiled, Expr};
 use hysid_signal::range;
 use rayon::prelude::*;
 
@@ -15,7 +16,7 @@ use super::fitting::refit;
 use super::screen::{Candidate, screen};
 use crate::budget::Step;
 use crate::evidence::Projector;
-use crate::mechanism::{Mechanism, number_with_unit};
+use crate::mechanism::{Family, Mechanism, number_with_unit};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 use crate::slot::Slot;
@@ -24,8 +25,12 @@ use crate::slot::Slot;
 const ROUNDING: &str = "quantisation";
 /// Part of a step by which values on the steps may miss them.
 const OFF_A_STEP: f64 = 0.1;
-/// Steps that the recording covers where they are fine.
-const FINE: f64 = 64.0;
+/// Rounding of fine steps in standard deviations of what is recorded, at most: that of a sensor's noise. Beyond it the recording is stairs.
+const FINE: f64 = 0.06;
+/// Levels from which on it can be seen that they lie on steps.
+const LEVELS: usize = 12;
+/// Period of a ripple, in steps by which its position is read, from which on it is one: what repeats with the steps is what the rounding does.
+const RIPPLE: f64 = 3.0;
 /// Share of what is left of an output from which on its rounding matters: that of the converter which every recording has does not.
 const MATTERS: f64 = 0.1;
 /// Log evidence from which on the rounding of converters is what is left, and share of that by which other effects must add to it: where no noise was rounded
@@ -59,10 +64,13 @@ impl Converter {
     }
 }
 
-/// The steps on which all values lie; `None` where they lie on no steps, or cover less than [`FINE`] of them.
+/// The steps on which all values lie; `None` where they lie on no steps, or these are not fine.
 fn fine_steps(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut levels: Vec<f64> = values.filter(|y| y.is_finite()).collect();
     levels.sort_by(f64::total_cmp);
+    let samples = levels.len() as f64;
+    let mean = levels.iter().sum::<f64>() / samples;
+    let spread = (levels.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / samples).sqrt();
     levels.dedup();
     let (low, high) = range(levels.iter().copied());
     let apart: Vec<f64> = levels.windows(2).map(|w| w[1] - w[0]).collect();
@@ -72,7 +80,8 @@ fn fine_steps(values: impl Iterator<Item = f64>) -> Option<f64> {
     let count = ((high - low) * single / sum).round();
     let q = (high - low) / count;
     let off = |y: &f64| ((y - low) / q - ((y - low) / q).round()).abs();
-    (count.is_finite() && count >= FINE && levels.iter().all(|y| off(y) <= OFF_A_STEP)).then_some(q)
+    let fine = levels.len() >= LEVELS && q <= 12.0_f64.sqrt() * FINE * spread;
+    (count.is_finite() && fine && levels.iter().all(|y| off(y) <= OFF_A_STEP)).then_some(q)
 }
 
 /// The steps of the fine converter on which the recorded values of an output lie.
@@ -94,7 +103,35 @@ impl Setting<'_> {
     /// physics, and beside it nothing is found in time.
     pub fn lacking(&self, h: &Hypothesis<'_>, evidence: &(Projector, Vec<f64>)) -> Vec<Candidate> {
         let sought = |m: &Mechanism, s: &Slot| m.id != ROUNDING || !self.rounded.contains(&s.label);
-        screen(&h.base, &self.original, &h.effects, evidence, &sought)
+        let mut found = screen(&h.base, &self.original, &h.effects, evidence, &sought);
+        for (read, shortest) in self.read_in_steps() {
+            let ripples = found.iter_mut().filter(|c| c.mechanism.family == Family::PositionRipple);
+            for ripple in ripples
+                .filter(|c| c.slot.coordinate().and_then(|x| c.slot.quantity(x)).is_some_and(|q| q.expression == read))
+            {
+                ripple.points.retain(|p| p.shapes.iter().all(|(_, period)| *period >= shortest));
+            }
+        }
+        found.retain(|c| !c.points.is_empty());
+        found.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        found
+    }
+
+    /// The states that fine converters read by themselves, and the shortest period of a ripple over each.
+    fn read_in_steps(&self) -> Vec<(Expr, f64)> {
+        let Some(compiled) = Compiled::new(&self.original).ok().filter(|_| !self.rounded.is_empty()) else {
+            return Vec::new();
+        };
+        let (states, inputs) = (self.original.states.len(), self.original.inputs.len());
+        let at = compiled.linearise(&compiled.theta(), &vec![0.0; states], &vec![0.0; inputs]);
+        let read = |(place, row): (usize, &[f64])| {
+            let label = format!("output:{}", self.original.outputs[place].column);
+            let step = recorded_steps(self, place).filter(|_| self.rounded.contains(&label))?;
+            let mut seen = row.iter().enumerate().filter(|(_, c)| **c != 0.0);
+            let ((state, gain), None) = (seen.next()?, seen.next()) else { return None };
+            Some((Expr::symbol(&self.original.states[state].name), RIPPLE * step / gain.abs()))
+        };
+        at.c.chunks(states.max(1)).enumerate().filter_map(read).collect()
     }
 }
 
@@ -177,31 +214,53 @@ mod tests {
 
     use super::*;
     use crate::budget::Budget;
+    use crate::data::DataSet;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::request::{Hooks, Options};
 
-    /// Whether the rounding to so many steps over the range of an oscillator's output is all that is left, with noise of these shares of a step before it
-    /// and behind it, and with this force besides.
-    fn all(steps: f64, [before, behind]: [f64; 2], force: impl Fn(f64, f64) -> f64) -> bool {
+    /// A recorded oscillator with a further force, the output rounded to so many steps over its range with noise of these shares of a step before that and
+    /// behind it, and the step.
+    fn converted(steps: f64, [before, behind]: [f64; 2], force: impl Fn(f64, f64) -> f64) -> (DataSet, f64) {
         let mut random = normal(5);
         let u = drive(1500, &mut random);
         let y = respond(&u, REAL, force);
-        let range = |y: &[f64]| y.iter().fold(0.0_f64, |m, y| m.max(*y)) - y.iter().fold(0.0_f64, |m, y| m.min(*y));
-        let q = range(&y) / steps;
+        let (low, high) = range(y.iter().copied());
+        let q = (high - low) / steps;
         let mut converted = |y: &f64| q * ((y / q + before * random()).round() + behind * random());
         let y: Vec<f64> = y.iter().map(&mut converted).collect();
         assert!(rms(&y) > q);
-        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
-        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        (recorded(&Simulation::parse(BASELINE, "test.sim.toml").unwrap(), PERIOD, [("u_N", u), ("x_m", y)]), q)
+    }
+
+    /// Whether the rounding of such a recording is all that is left.
+    fn all(steps: f64, noise: [f64; 2], force: impl Fn(f64, f64) -> f64) -> bool {
+        let (data, _) = converted(steps, noise, force);
         let budget = Budget::new(&|_| false);
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let (mut setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
         setting.rounded = rounded(&setting, &none.base);
         let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let asked = |id: &str, slot: &str| search.answer(&none, &vec![(id.to_owned(), slot.to_owned())]);
         let friction = asked("coulomb_friction", "state:v");
         search.by_rounding(&none, &mut Vec::from_iter(friction), 50).is_some()
+    }
+
+    #[test]
+    fn what_repeats_with_the_steps_is_no_ripple() {
+        let (data, q) = converted(50.0, [0.0, 0.0], |_, _| 0.0);
+        let budget = Budget::new(&|_| false);
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let (mut setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        let shortest = |setting: &Setting<'_>| {
+            let all = setting.lacking(&none, &none.base.evidence());
+            let cogging = all.iter().find(|c| c.mechanism.id == "cogging").unwrap();
+            cogging.points.iter().map(|p| p.shapes[0].1).fold(f64::INFINITY, f64::min) / q
+        };
+        assert!(shortest(&setting) < 1.5);
+        setting.rounded = rounded(&setting, &none.base);
+        assert!((RIPPLE..2.0 * RIPPLE).contains(&shortest(&setting)));
     }
 
     #[test]
@@ -219,6 +278,7 @@ mod tests {
     fn a_fine_converter_alone_leaves_nothing_and_is_no_mismatch() {
         let nothing = |_: f64, _: f64| 0.0;
         assert!(all(150.0, [0.0, 0.0], nothing));
+        assert!(all(50.0, [0.0, 0.0], nothing), "as much as the noise of a sensor");
         assert!(all(150.0, [0.25, 0.0], nothing), "noise that is rounded too");
         assert!(!all(150.0, [0.0, 0.3], nothing), "steps beside a noise of their size");
         assert!(!all(20.0, [0.0, 0.0], nothing), "stairs");
