@@ -7,6 +7,7 @@ mod cut;
 pub mod glitches;
 pub mod intake;
 pub mod plant;
+pub mod steps;
 mod thinning;
 mod windows;
 

@@ -7,7 +7,7 @@ use hysid_plant::{Expr, Initial, Parameter, Simulation, State, Unit};
 use super::enter::{Writer, enter};
 use super::rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 use super::signals::Signals;
-use super::{Amplitudes, Change, Law, Mechanism, Purpose, Role, Start};
+use super::{Amplitudes, Change, Grid, Law, Mechanism, Purpose, Role, Start};
 use crate::slot::Slot;
 
 /// Why a law could not be written into a simulation: a fault of the catalogue, not of the user.
@@ -124,6 +124,10 @@ fn write_law(
                     Some((low, high)) => (low * size, high * size),
                     None => signals.bounds(grid, &values),
                 };
+                if let Grid::Turns(..) = grid {
+                    low = low.max(signals.shortest_period);
+                    high = high.max(low);
+                }
                 if let Some((measure, times)) = &parameter.floor {
                     low = low.max(multiple(*times, measure).unwrap_or(low));
                     high = high.max(3.0 * low);

@@ -40,6 +40,8 @@ pub struct Signals {
     pub peaks_hz: Vec<f64>,
     /// Periods over the displacement to which the residual points, in its unit.
     pub periods: Vec<f64>,
+    /// The shortest period over the displacement that is told from the steps in which a converter reads it.
+    pub shortest_period: f64,
 }
 
 impl Signals {
@@ -60,6 +62,7 @@ impl Signals {
             step: OnceLock::new(),
             band_hz,
             peaks_hz: Vec::new(),
+            shortest_period: 0.0,
             periods: Vec::new(),
         }
     }

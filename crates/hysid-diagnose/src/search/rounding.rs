@@ -6,8 +6,6 @@
 //!
 //! Reference: B. Widrow, I. Kollár, Quantization Noise, Cambridge University Press (2008), ch. 1.
 
-use hysid_plant::{Compiled, Expr};
-use hysid_signal::range;
 use rayon::prelude::*;
 
 use super::Search;
@@ -15,22 +13,15 @@ use super::compose::{add, best_of};
 use super::fitting::refit;
 use super::screen::{Candidate, screen};
 use crate::budget::Step;
+use crate::data::steps::OFF_A_STEP;
 use crate::evidence::Projector;
-use crate::mechanism::{Family, Mechanism, number_with_unit};
+use crate::mechanism::{Mechanism, number_with_unit};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 use crate::slot::Slot;
 
 /// What is rounded to steps that are told as an effect otherwise.
 const ROUNDING: &str = "quantisation";
-/// Part of a step by which values on the steps may miss them.
-const OFF_A_STEP: f64 = 0.1;
-/// Rounding of fine steps in standard deviations of what is recorded, at most: that of a sensor's noise. Beyond it the recording is stairs.
-const FINE: f64 = 0.06;
-/// Levels from which on it can be seen that they lie on steps.
-const LEVELS: usize = 12;
-/// Period of a ripple, in steps by which its position is read, from which on it is one: what repeats with the steps is what the rounding does.
-const RIPPLE: f64 = 3.0;
 /// Share of what is left of an output from which on its rounding matters: that of the converter which every recording has does not.
 const MATTERS: f64 = 0.1;
 /// Log evidence from which on the rounding of converters is what is left, and share of that by which other effects must add to it: where no noise was rounded
@@ -64,36 +55,11 @@ impl Converter {
     }
 }
 
-/// The steps on which all values lie; `None` where they lie on no steps, or these are not fine.
-fn fine_steps(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut levels: Vec<f64> = values.filter(|y| y.is_finite()).collect();
-    levels.sort_by(f64::total_cmp);
-    let samples = levels.len() as f64;
-    let mean = levels.iter().sum::<f64>() / samples;
-    let spread = (levels.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / samples).sqrt();
-    levels.dedup();
-    let (low, high) = range(levels.iter().copied());
-    let apart: Vec<f64> = levels.windows(2).map(|w| w[1] - w[0]).collect();
-    let least = apart.iter().copied().fold(f64::INFINITY, f64::min);
-    // A difference is as exact as the recording is written; the mean of those of one step is more so, and the whole range even more.
-    let (sum, single) = apart.iter().filter(|d| **d < 1.5 * least).fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
-    let count = ((high - low) * single / sum).round();
-    let q = (high - low) / count;
-    let off = |y: &f64| ((y - low) / q - ((y - low) / q).round()).abs();
-    let fine = levels.len() >= LEVELS && q <= 12.0_f64.sqrt() * FINE * spread;
-    (count.is_finite() && fine && levels.iter().all(|y| off(y) <= OFF_A_STEP)).then_some(q)
-}
-
-/// The steps of the fine converter on which the recorded values of an output lie.
-fn recorded_steps(setting: &Setting<'_>, output: usize) -> Option<f64> {
-    fine_steps(setting.data.stretches.iter().flat_map(|s| s.outputs[output].iter().copied()))
-}
-
 /// Labels of the outputs of which the recorded values lie on the steps of a fine converter, where its rounding is much of what is left.
 pub fn rounded(setting: &Setting<'_>, none: &Base<'_>) -> Vec<String> {
     let left = setting.data.layout.rms(&none.fit.residual);
     let matters =
-        |place: usize| recorded_steps(setting, place).is_some_and(|q| q / 12.0_f64.sqrt() >= MATTERS * left[place]);
+        |place: usize| setting.data.steps(place).is_some_and(|q| q / 12.0_f64.sqrt() >= MATTERS * left[place]);
     let outputs = setting.original.outputs.iter().enumerate().filter(|(place, _)| matters(*place));
     outputs.map(|(_, output)| format!("output:{}", output.column)).collect()
 }
@@ -103,35 +69,7 @@ impl Setting<'_> {
     /// physics, and beside it nothing is found in time.
     pub fn lacking(&self, h: &Hypothesis<'_>, evidence: &(Projector, Vec<f64>)) -> Vec<Candidate> {
         let sought = |m: &Mechanism, s: &Slot| m.id != ROUNDING || !self.rounded.contains(&s.label);
-        let mut found = screen(&h.base, &self.original, &h.effects, evidence, &sought);
-        for (read, shortest) in self.read_in_steps() {
-            let ripples = found.iter_mut().filter(|c| c.mechanism.family == Family::PositionRipple);
-            for ripple in ripples
-                .filter(|c| c.slot.coordinate().and_then(|x| c.slot.quantity(x)).is_some_and(|q| q.expression == read))
-            {
-                ripple.points.retain(|p| p.shapes.iter().all(|(_, period)| *period >= shortest));
-            }
-        }
-        found.retain(|c| !c.points.is_empty());
-        found.sort_by(|a, b| b.score().total_cmp(&a.score()));
-        found
-    }
-
-    /// The states that fine converters read by themselves, and the shortest period of a ripple over each.
-    fn read_in_steps(&self) -> Vec<(Expr, f64)> {
-        let Some(compiled) = Compiled::new(&self.original).ok().filter(|_| !self.rounded.is_empty()) else {
-            return Vec::new();
-        };
-        let (states, inputs) = (self.original.states.len(), self.original.inputs.len());
-        let at = compiled.linearise(&compiled.theta(), &vec![0.0; states], &vec![0.0; inputs]);
-        let read = |(place, row): (usize, &[f64])| {
-            let label = format!("output:{}", self.original.outputs[place].column);
-            let step = recorded_steps(self, place).filter(|_| self.rounded.contains(&label))?;
-            let mut seen = row.iter().enumerate().filter(|(_, c)| **c != 0.0);
-            let ((state, gain), None) = (seen.next()?, seen.next()) else { return None };
-            Some((Expr::symbol(&self.original.states[state].name), RIPPLE * step / gain.abs()))
-        };
-        at.c.chunks(states.max(1)).enumerate().filter_map(read).collect()
+        screen(&h.base, &self.original, &h.effects, evidence, &sought)
     }
 }
 
@@ -144,7 +82,7 @@ impl<'d> Search<'_, 'd> {
             let place = outputs.iter().position(|o| effect.slot.label == format!("output:{}", o.column))?;
             let step = effect.written.report.first().filter(|_| effect.mechanism.id == ROUNDING)?;
             let q = *values.parameters.get(step.value.symbols().first()?)?;
-            let own = recorded_steps(&self.setting, place).is_some_and(|own| (q / own - 1.0).abs() <= OFF_A_STEP);
+            let own = self.setting.data.steps(place).is_some_and(|own| (q / own - 1.0).abs() <= OFF_A_STEP);
             let words = format!("`{}` ({})", outputs[place].column, number_with_unit(q, step.unit.as_ref()));
             own.then_some(Converter { member, words })
         };
@@ -211,6 +149,7 @@ fn beside_converters<'d>(setting: &Setting<'d>, set: &Hypothesis<'d>) -> Option<
 #[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
+    use hysid_signal::range;
 
     use super::*;
     use crate::budget::Budget;
@@ -245,33 +184,6 @@ mod tests {
         let asked = |id: &str, slot: &str| search.answer(&none, &vec![(id.to_owned(), slot.to_owned())]);
         let friction = asked("coulomb_friction", "state:v");
         search.by_rounding(&none, &mut Vec::from_iter(friction), 50).is_some()
-    }
-
-    #[test]
-    fn what_repeats_with_the_steps_is_no_ripple() {
-        let (data, q) = converted(50.0, [0.0, 0.0], |_, _| 0.0);
-        let budget = Budget::new(&|_| false);
-        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
-        let (mut setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
-        let shortest = |setting: &Setting<'_>| {
-            let all = setting.lacking(&none, &none.base.evidence());
-            let cogging = all.iter().find(|c| c.mechanism.id == "cogging").unwrap();
-            cogging.points.iter().map(|p| p.shapes[0].1).fold(f64::INFINITY, f64::min) / q
-        };
-        assert!(shortest(&setting) < 1.5);
-        setting.rounded = rounded(&setting, &none.base);
-        assert!((RIPPLE..2.0 * RIPPLE).contains(&shortest(&setting)));
-    }
-
-    #[test]
-    fn steps_are_seen_through_the_digits_that_a_recording_is_written_with() {
-        let steps = |q: f64, digits: f64| (0..900).map(move |i| (q * f64::from(i * i % 700) * digits).round() / digits);
-        let found = fine_steps(steps(0.917_33, 1e3)).unwrap();
-        assert!((found / 0.917_33 - 1.0).abs() < 1e-5, "{found}");
-        assert_eq!(fine_steps(steps(0.917_33, 1e3).take(8)), None, "a handful of levels");
-        let mut random = normal(3);
-        assert_eq!(fine_steps((0..900).map(|_| random())), None);
-        assert_eq!(fine_steps(std::iter::repeat_n(1.0, 9)), None);
     }
 
     #[test]

@@ -90,7 +90,13 @@ impl Candidate {
 }
 
 /// What is known of the signals at each slot.
-fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64], periods: &[Vec<f64>]) -> Vec<Option<Signals>> {
+fn signals(
+    base: &Base<'_>,
+    original: &Simulation,
+    structure: &Structure,
+    peaks_hz: &[f64],
+    periods: &[Vec<f64>],
+) -> Vec<Option<Signals>> {
     let data = base.model.data();
     let simulation = base.model.simulation();
     let constant = |e: &Expr| e.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some());
@@ -114,6 +120,7 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64], periods: &[
         stretches.push(from..from + s.len());
         from += s.len();
     }
+    let read = data.read_in_steps(original);
     let start_s = data.stretches.iter().max_by_key(|s| s.len()).map_or(0.0, |s| s.start_s);
     structure
         .slots
@@ -135,6 +142,9 @@ fn signals(base: &Base<'_>, structure: &Structure, peaks_hz: &[f64], periods: &[
             signals.constants = constants;
             signals.peaks_hz = peaks_hz.to_vec();
             signals.periods = periods.get(i).cloned().unwrap_or_default();
+            let over = slot.coordinate().and_then(|x| slot.quantity(x)).map(|q| q.expression.to_string());
+            let shortest = read.iter().filter(|(state, _)| over.as_ref() == Some(state)).map(|(_, shortest)| *shortest);
+            signals.shortest_period = shortest.fold(0.0, f64::max);
             let output =
                 slot.label.strip_prefix("output:").and_then(|c| simulation.outputs.iter().position(|o| o.column == c));
             if let Some(o) = output {
@@ -185,7 +195,7 @@ pub fn screen_along(
     let ripples = || catalogue().iter().filter(|m| m.family == Family::PositionRipple);
     let looked_for = structure.slots.iter().any(|slot| ripples().any(|m| m.fits(slot) && keep(m, slot)));
     let periods = if looked_for { residual_periods(along.motion, &structure, r) } else { Vec::new() };
-    let at = signals(along.motion, &structure, &peaks, &periods);
+    let at = signals(along.motion, original, &structure, &peaks, &periods);
     let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();
     for mechanism in catalogue() {
         for (place, slot) in structure.slots.iter().enumerate() {
@@ -298,7 +308,7 @@ pub fn rewrite_at(
     purpose: Purpose,
 ) -> Option<(Rewritten, Slot)> {
     let sizes = Structure::within(&base.document(), original);
-    let at = signals(base, &sizes, &residual_peaks(base), &[]);
+    let at = signals(base, original, &sizes, &residual_peaks(base), &[]);
     // What the simulation's numerics lack is told in words of its own.
     let known = |s: &&Slot| s.label == slot.label && mechanism.places.contains(&s.place);
     let place_in =
@@ -316,7 +326,7 @@ mod tests {
     use crate::budget::Budget;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
-    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::search::rivals::short_list;
 
     /// Whether a sensor that is blind to the sign is tried, of a list of one, where the recording is this of the oscillator's displacement.
@@ -339,5 +349,33 @@ mod tests {
     fn what_the_recording_shows_by_itself_is_tried() {
         assert!(blind_sensor_is_tried(f64::abs));
         assert!(!blind_sensor_is_tried(|x| x));
+    }
+
+    #[test]
+    fn what_repeats_with_the_steps_of_a_converter_is_no_ripple() {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let u = drive(1000, &mut normal(4));
+        let y = respond(&u, REAL, |_, _| 0.0);
+        let q = 0.1 * rms(&y);
+        // The shortest period that is tried, in steps, where the displacement is read in steps of so many.
+        let shortest = |steps: f64| {
+            let read = |y: &f64| if steps > 0.0 { steps * q * (y / (steps * q)).round() } else { *y };
+            let data = recorded(&original, PERIOD, [("u_N", u.clone()), ("x_m", y.iter().map(read).collect())]);
+            let budget = Budget::new(&|_| false);
+            let (setting, none) = calibrated(original.clone(), &data, NoiseKind::White(1.0), &budget);
+            let ripple = |m: &Mechanism, _: &Slot| m.id == "cogging";
+            let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &ripple);
+            let written = &found[0].refit;
+            let bound = written.simulation.parameter(&written.shapes[0].name).unwrap().lower();
+            let tried = found[0].points.iter().map(|p| p.shapes[0].1).fold(f64::INFINITY, f64::min);
+            assert!(bound <= tried * (1.0 + 1e-9));
+            (bound / q, tried / q)
+        };
+        let (bound, tried) = shortest(0.0);
+        assert!(bound < 0.1 && tried < 2.0, "{bound} {tried}");
+        let (bound, tried) = shortest(1.0);
+        assert!((bound - 3.0).abs() < 1e-3 && (3.0..4.0).contains(&(tried * 1.001)), "{bound} {tried}");
+        // Stairs are an effect.
+        assert!(shortest(4.0).0 < 0.1);
     }
 }
