@@ -3,6 +3,7 @@
 use super::weigh::{EVIDENCE_WEIGHT, IMPERFECT_WEIGHT, bounded, log_weights, stretched};
 use super::{Hypothesis as Weighed, NOT_FIRM, Support, probabilities, supports};
 use crate::mechanism::{Family, catalogue};
+use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, OnBlocks, best_that_says};
 use crate::slot::Structure;
 
@@ -62,6 +63,7 @@ pub fn firmness(
             || of_turned_noise
             || of_rounding
             || of_a_spectrum
+            || is_turned_round(&best.base, e)
             || stretched(&best.base, e)
             || has_twin(pool, winner, i);
         if doubtful || twice || vague {
@@ -153,6 +155,13 @@ fn is_a_loop_without_a_spring(h: &Hypothesis<'_>, member: usize) -> bool {
     matches!(effect.mechanism.family, Family::HystereticSpring | Family::Presliding) && !effect.slot.has("k")
 }
 
+/// Whether a member is a Stribeck friction that is smaller at rest than when sliding. That is none, and stands for what rises with the speed and levels off
+/// (the drag of an eddy-current brake was told so with 100 %).
+fn is_turned_round(base: &Base<'_>, effect: &Effect) -> bool {
+    let falls = effect.written.amplitudes.last().and_then(|a| base.model.place_of(&a.name));
+    effect.mechanism.id == "stribeck_friction" && falls.is_some_and(|place| base.fit.theta[place] < 0.0)
+}
+
 /// Whether a member is a lag shorter than a sample: its transient passes between the samples, where a delay, a lag of a sensor and that of a
 /// winding are all the same shift in time, and what is left to tell them apart is how the recording began.
 fn passes_between_samples(h: &Hypothesis<'_>, member: usize) -> bool {
@@ -193,6 +202,26 @@ mod tests {
         let pool: Vec<Hypothesis<'_>> = std::iter::once(none).chain(sets).collect();
         assert_eq!(pool.len(), 2 + besides.len());
         has_twin(&pool, 1, 0)
+    }
+
+    #[test]
+    fn a_friction_that_is_smaller_at_rest_is_not_firm() {
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let u = drive(600, &mut normal(11));
+        let y = respond(&u, REAL, |_, v| 4.0 * v.signum());
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
+        let told = |id: &str, falls: f64| {
+            let set = search.answer(&none, &vec![(id.to_owned(), "state:v".to_owned())]).unwrap();
+            let Hypothesis { mut base, effects, .. } = set;
+            let last = base.model.place_of(&effects[0].written.amplitudes.last().unwrap().name).unwrap();
+            base.fit.theta[last] = falls;
+            is_turned_round(&base, &effects[0])
+        };
+        assert!(told("stribeck_friction", -0.5) && !told("stribeck_friction", 0.5));
+        assert!(!told("cubic_stiffness", -0.5), "a spring may soften");
     }
 
     #[test]

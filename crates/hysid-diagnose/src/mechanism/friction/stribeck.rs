@@ -28,10 +28,10 @@ pub static STRIBECK_FRICTION: Mechanism = Mechanism {
             if free { law.shape("d_s", "1", Grid::Values(vec![1.0, 1.5])).within(1.0, 4.0) } else { law }
         };
         if is_there(slot) {
-            return speed(Law::force(format!("F_d*{fall}*{}", sign(slot))).amplitude("F_d", "F", 0.0, 1.0));
+            return speed(Law::force(format!("F_d*{fall}*{}", sign(slot))).amplitude("F_d", "F", -0.5, 1.0));
         }
         let law = Law::force(format!("(F_c + F_d*{fall})*sign(v)"));
-        speed(law.amplitude("F_c", "F", 0.0, 1.0).amplitude("F_d", "F", 0.0, 1.0)).report("F_s", "F", "F_c + F_d")
+        speed(law.amplitude("F_c", "F", 0.0, 1.0).amplitude("F_d", "F", -0.5, 1.0)).report("F_s", "F", "F_c + F_d")
     },
     contains: &["coulomb_friction"],
     confusable: &["coulomb_friction", "cogging"],
