@@ -4,6 +4,7 @@ use hysid_plant::{Compiled, Simulation};
 use hysid_signal::range;
 
 use super::DataSet;
+use crate::mechanism::{mean, rms};
 
 /// Part of a step by which values on the steps may miss them.
 pub const OFF_A_STEP: f64 = 0.1;
@@ -18,9 +19,7 @@ const RIPPLE: f64 = 3.0;
 fn fine_steps(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut levels: Vec<f64> = values.filter(|y| y.is_finite()).collect();
     levels.sort_by(f64::total_cmp);
-    let samples = levels.len() as f64;
-    let mean = levels.iter().sum::<f64>() / samples;
-    let spread = (levels.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / samples).sqrt();
+    let spread = rms(&levels, mean(&levels));
     levels.dedup();
     let (low, high) = range(levels.iter().copied());
     let apart: Vec<f64> = levels.windows(2).map(|w| w[1] - w[0]).collect();

@@ -58,7 +58,7 @@ pub use page::catalogue_page;
 pub use rewrite::RewriteError;
 pub use rewritten::{Amplitude, Places, Reported, Rewritten, Shape};
 pub use sentence::{Value, number_with_unit};
-pub use signals::{Signals, band_but_for, excited_band};
+pub use signals::{Signals, band_but_for, excited_band, mean, rms};
 pub use survey::{Stretch, SurveyError, survey};
 
 /// One entry of the catalogue.

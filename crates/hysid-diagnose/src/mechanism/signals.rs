@@ -244,11 +244,13 @@ impl Signals {
     }
 }
 
-pub(super) fn mean(series: &[f64]) -> f64 {
+/// The mean of a series.
+pub fn mean(series: &[f64]) -> f64 {
     series.iter().sum::<f64>() / series.len().max(1) as f64
 }
 
-pub(super) fn rms(series: &[f64], about: f64) -> f64 {
+/// The root of the mean square of a series, counted from a value.
+pub fn rms(series: &[f64], about: f64) -> f64 {
     let mean_square = series.iter().map(|v| (v - about).powi(2)).sum::<f64>() / series.len().max(1) as f64;
     mean_square.sqrt()
 }

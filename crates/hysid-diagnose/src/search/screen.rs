@@ -89,13 +89,13 @@ impl Candidate {
     }
 }
 
-/// What is known of the signals at each slot.
+/// What is known of the signals at each slot; `periods` and `read` ([`crate::data::DataSet::read_in_steps`]) matter to ripples only.
 fn signals(
     base: &Base<'_>,
-    original: &Simulation,
     structure: &Structure,
     peaks_hz: &[f64],
     periods: &[Vec<f64>],
+    read: &[(String, f64)],
 ) -> Vec<Option<Signals>> {
     let data = base.model.data();
     let simulation = base.model.simulation();
@@ -120,7 +120,6 @@ fn signals(
         stretches.push(from..from + s.len());
         from += s.len();
     }
-    let read = data.read_in_steps(original);
     let start_s = data.stretches.iter().max_by_key(|s| s.len()).map_or(0.0, |s| s.start_s);
     structure
         .slots
@@ -195,7 +194,8 @@ pub fn screen_along(
     let ripples = || catalogue().iter().filter(|m| m.family == Family::PositionRipple);
     let looked_for = structure.slots.iter().any(|slot| ripples().any(|m| m.fits(slot) && keep(m, slot)));
     let periods = if looked_for { residual_periods(along.motion, &structure, r) } else { Vec::new() };
-    let at = signals(along.motion, original, &structure, &peaks, &periods);
+    let read = if looked_for { along.motion.model.data().read_in_steps(original) } else { Vec::new() };
+    let at = signals(along.motion, &structure, &peaks, &periods, &read);
     let mut work: Vec<(&'static Mechanism, &Slot, &Signals)> = Vec::new();
     for mechanism in catalogue() {
         for (place, slot) in structure.slots.iter().enumerate() {
@@ -308,7 +308,9 @@ pub fn rewrite_at(
     purpose: Purpose,
 ) -> Option<(Rewritten, Slot)> {
     let sizes = Structure::within(&base.document(), original);
-    let at = signals(base, original, &sizes, &residual_peaks(base), &[]);
+    let ripple = mechanism.family == Family::PositionRipple;
+    let read = if ripple { base.model.data().read_in_steps(original) } else { Vec::new() };
+    let at = signals(base, &sizes, &residual_peaks(base), &[], &read);
     // What the simulation's numerics lack is told in words of its own.
     let known = |s: &&Slot| s.label == slot.label && mechanism.places.contains(&s.place);
     let place_in =
