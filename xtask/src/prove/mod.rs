@@ -113,7 +113,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let start = Instant::now();
     let root = std::env::temp_dir().join(format!("hysid-prove-{}", std::process::id()));
     let seconds = args.time_limit.unwrap_or(if args.quick { 60 } else { 120 });
-    let bench = Bench { binary, root: root.clone(), time_limit: Duration::from_secs(seconds) };
+    let bench = Bench { binary, root: root.clone(), time_limit: Duration::from_secs(seconds), black_box: !args.quick };
     let bank = Bank {
         stream,
         seed: args.seed,

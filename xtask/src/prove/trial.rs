@@ -33,6 +33,8 @@ pub struct Bench {
     pub root: PathBuf,
     /// Limit that is told to the program.
     pub time_limit: Duration,
+    /// Whether the program learns a black box of its own beside the simulation.
+    pub black_box: bool,
 }
 
 impl Bench {
@@ -43,10 +45,14 @@ impl Bench {
         case.write(&folder)?;
         let start = Instant::now();
         let limit = format!("{}", self.time_limit.as_secs());
+        let mut more = vec!["--time-limit", &limit, "--out"];
+        if !self.black_box {
+            more.insert(0, "--no-black-box");
+        }
         let said = self.call(
             &folder,
             &["diagnose", "baseline.sim.toml", "--recording", "est.csv", "--holdout", "val.csv", "--threads", "1"],
-            &["--time-limit", &limit, "--out"],
+            &more,
             &out,
         );
         let seconds = start.elapsed().as_secs_f64();

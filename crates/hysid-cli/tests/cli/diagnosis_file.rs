@@ -266,6 +266,18 @@ fn the_same_bytes_for_any_number_of_threads() {
 }
 
 #[test]
+fn the_black_box_can_be_left_out() {
+    let files = hardening();
+    let (with, _) = diagnosed(&files, &DIAGNOSE);
+    let (without, stderr) = diagnosed(&files, &[&DIAGNOSE[..], &["--no-black-box"]].concat());
+    assert!(!stderr.contains("black box"), "{stderr}");
+    assert!(with["fit"][0]["rmse_black_box"].is_number() && without["fit"][0]["rmse_black_box"].is_null());
+    assert_eq!((&with["effects"], &with["notes"]), (&without["effects"], &without["notes"]));
+    let page = std::fs::read_to_string(files.path().join("out/report.html")).unwrap();
+    assert!(!page.contains("black box"));
+}
+
+#[test]
 fn a_time_limit_leaves_out_steps_and_says_so() {
     let files = hardening();
     let (d, _) = diagnosed(&files, &[&DIAGNOSE[..], &["--time-limit", "0.001"]].concat());

@@ -64,6 +64,9 @@ pub struct Args {
     /// result depends on the machine
     #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
+    /// Do without the model without physics that is identified from the same recordings and scored beside the simulation
+    #[arg(long)]
+    no_black_box: bool,
 }
 
 /// Diagnoses and writes the folder; prints the verdict on stdout.
@@ -82,7 +85,12 @@ fn work(args: &Args) -> Result<(), Failure> {
     let questions = args.consider.iter().map(|text| question(text)).collect::<Result<Vec<_>, _>>()?;
     let progress = |step: &str| eprintln!("hysid: {step} ...");
     let expired = |share: f64| args.time_limit.is_some_and(|limit| began.elapsed().as_secs_f64() > share * limit);
-    let watch = Watch { progress: &progress, expired: &expired, limited: args.time_limit.is_some() };
+    let black_box = match (args.no_black_box, args.time_limit) {
+        (true, _) => BlackBox::LeftOut,
+        (false, None) => BlackBox::Beside,
+        (false, Some(_)) => BlackBox::Last,
+    };
+    let watch = Watch { progress: &progress, expired: &expired, black_box };
     let files = Files { estimation: &args.recording, holdout: &args.holdout };
     let inputs = args.simulation.iter().chain(&args.recording).chain(&args.holdout);
     keep_inputs(&args.out, &[PAGE, AUGMENTED, DIAGNOSIS], inputs)?;
@@ -150,13 +158,21 @@ struct Watch<'a> {
     progress: &'a (dyn Fn(&str) + Sync),
     /// Whether this share of the time limit is used up.
     expired: &'a (dyn Fn(f64) -> bool + Sync),
-    /// Whether there is a limit.
-    limited: bool,
+    black_box: BlackBox,
 }
 
-/// The diagnosis, with a black box beside it.
-///
-/// Without a time limit the black box is learnt while the search goes on: some steps of either leave processors idle.
+/// When the black box is learnt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum BlackBox {
+    /// While the search goes on: some steps of either leave processors idle.
+    Beside,
+    /// After it, if there is time: where time is limited, the search comes first.
+    Last,
+    /// Never.
+    LeftOut,
+}
+
+/// The diagnosis, with a black box beside it if one is wanted.
 fn answer(
     simulation: &Simulation,
     file: &str,
@@ -171,7 +187,8 @@ fn answer(
     let models: OnceLock<black_box::Models> = OnceLock::new();
     let outcome = rayon::scope(|scope| {
         let beside = || {
-            if let Some(learn) = black_box::early(simulation, intake, options.seed).filter(|_| !watch.limited) {
+            let early = black_box::early(simulation, intake, options.seed);
+            if let Some(learn) = early.filter(|_| watch.black_box == BlackBox::Beside) {
                 told();
                 scope.spawn(|_| {
                     // Nobody else sets it.
@@ -183,6 +200,9 @@ fn answer(
         diagnose(&request, &hooks)
     });
     let mut outcome = outcome.map_err(|e| refused(&e, &request))?;
+    if watch.black_box == BlackBox::LeftOut {
+        return Ok(outcome);
+    }
     let late = || (watch.expired)(1.0);
     let models = models.into_inner().or_else(|| {
         (!late()).then(|| {
