@@ -46,6 +46,11 @@ pub struct SurrogateTest {
 }
 
 impl SurrogateTest {
+    /// The test of a residual in which there is nothing.
+    pub fn of_nothing() -> Self {
+        Self { p_value: 1.0, statistic: 0.0, best: None, surrogates: Vec::new() }
+    }
+
     /// Whether it tells the residual from noise at this level. A p-value at the level is enough: the residual itself is counted among the surrogates, so
     /// that noise has one so small with a probability of the level.
     pub fn tells(&self, alpha: f64) -> bool {

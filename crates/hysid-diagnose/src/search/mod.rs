@@ -226,7 +226,7 @@ impl<'a, 'd> Search<'a, 'd> {
         if let Some(known) = held(&self.open).get(&key) {
             return known.clone();
         }
-        let found = correction(&h.base, self.setting.noise);
+        let found = if self.leaves_nothing(h) { None } else { correction(&h.base, self.setting.noise) };
         held(&self.open).insert(key, found.clone());
         found
     }
@@ -236,6 +236,9 @@ impl<'a, 'd> Search<'a, 'd> {
         let key = fitted_key(h);
         if let Some(known) = held(&self.tests).get(&key) {
             return known.clone();
+        }
+        if self.leaves_nothing(h) {
+            return SurrogateTest::of_nothing();
         }
         let evidence = h.base.evidence();
         let rest = self.setting.lacking(h, &evidence);

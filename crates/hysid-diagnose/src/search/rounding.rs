@@ -28,6 +28,9 @@ const MATTERS: f64 = 0.1;
 /// the right law leaves nothing at most samples and a whole step at a few, and a normal distribution grants much for a handful of these.
 const EXPLAINS: f64 = 12.0;
 const BESIDE: f64 = 0.05;
+/// What is left in steps where one sample of fifty is read as the next step, as what is a tenth of the rounding makes it. The right law does no worse: where
+/// it comes near the middle between two steps the last digits of its parameters decide, and a normal distribution grants all there is for each such sample.
+const NO_WORSE: f64 = 0.15;
 /// Sets that are fitted beside the converters, and log evidence by which they may trail the best.
 const SETS: usize = 8;
 const TRAIL: f64 = 30.0;
@@ -36,6 +39,9 @@ const TRAIL: f64 = 30.0;
 pub struct Converter {
     /// Its place in the set.
     pub member: usize,
+    /// The output that it rounds, and its step.
+    output: usize,
+    step: f64,
     /// The column and the step, in words.
     words: String,
 }
@@ -84,9 +90,16 @@ impl<'d> Search<'_, 'd> {
             let q = *values.parameters.get(step.value.symbols().first()?)?;
             let own = self.setting.data.steps(place).is_some_and(|own| (q / own - 1.0).abs() <= OFF_A_STEP);
             let words = format!("`{}` ({})", outputs[place].column, number_with_unit(q, step.unit.as_ref()));
-            own.then_some(Converter { member, words })
+            own.then_some(Converter { member, output: place, step: q, words })
         };
         set.effects.iter().enumerate().filter_map(fine).collect()
+    }
+
+    /// Whether a set with the converters of all outputs reads the samples as they were recorded: nothing more can be told.
+    pub fn leaves_nothing(&self, set: &Hypothesis<'_>) -> bool {
+        let left = self.setting.data.layout.rms(&set.base.fit.residual);
+        let converters = self.converters(set);
+        converters.len() == left.len() && converters.iter().all(|c| left[c.output] < NO_WORSE * c.step)
     }
 
     /// The place in a pool of the set that is nothing but those converters of the recording which one of its sets has; `None` where that has none.
@@ -116,8 +129,10 @@ impl<'d> Search<'_, 'd> {
         order.truncate(SETS);
         let seen = self.likeliest(none, &order, candidates).is_some_and(|(p, _)| p < self.options.alpha);
         let setting = &self.setting;
-        let beside: Vec<Hypothesis<'d>> =
+        let mut beside: Vec<Hypothesis<'d>> =
             order.into_par_iter().filter(|_| seen).filter_map(|h| beside_converters(setting, h)).collect();
+        let complete = beside.iter().filter(|h| self.leaves_nothing(h)).map(|h| h.effects.len()).min();
+        beside.retain(|h| complete.is_none_or(|fewest| h.effects.len() <= fewest));
         let least = alone.log_evidence + (EXPLAINS + (candidates.max(1) as f64).ln()).max(BESIDE * explained);
         if beside.iter().any(|h| h.log_evidence > least) {
             beside.into_iter().chain([alone]).for_each(|h| add(pool, h));
@@ -195,5 +210,28 @@ mod tests {
         assert!(!all(150.0, [0.0, 0.3], nothing), "steps beside a noise of their size");
         assert!(!all(20.0, [0.0, 0.0], nothing), "stairs");
         assert!(!all(150.0, [0.0, 0.0], |_, v| 0.3 * v.signum()), "dry friction besides");
+    }
+
+    #[test]
+    fn where_samples_are_read_as_they_were_recorded_nothing_more_is_told() {
+        let (data, _) = converted(150.0, [0.0, 0.0], |x, _| 2.0 * x.powi(3));
+        let budget = Budget::new(&|_| false);
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let (mut setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
+        setting.rounded = rounded(&setting, &none.base);
+        let search = Search::new(setting, Options::default(), &Hooks::SILENT);
+        let asked = |effects: &[(&str, &str)]| {
+            let question = effects.iter().map(|(id, slot)| ((*id).to_owned(), (*slot).to_owned())).collect();
+            search.answer(&none, &question).unwrap()
+        };
+        let cubic = ("cubic_stiffness", "state:v");
+        let spring = asked(&[cubic]);
+        assert!(!search.leaves_nothing(&spring));
+        let mut pool = vec![spring, asked(&[cubic, ("output_offset", "output:x_m")])];
+        assert!(search.by_rounding(&none, &mut pool, 50).is_none());
+        let best = &pool[best_of(&pool).unwrap()];
+        assert_eq!((best.effects.len(), best.effects[0].mechanism.id), (2, cubic.0));
+        assert!(search.leaves_nothing(best) && search.open(best).is_none());
+        assert!(!search.remains(best).tells(0.5));
     }
 }
