@@ -4,14 +4,15 @@ use rayon::prelude::*;
 
 use super::assemble::{Part, assemble, complete, without};
 use super::finer::{finer, inherited};
-use super::fitting::{HOPELESS, refit_all};
+use super::fitting::{HOPELESS, refit_all, refit_beside};
 use super::joint::pairs;
+use super::looks::Looks;
 use super::parted::parted;
 use super::rivals::{include, rivals_of, short_list};
 use super::screen::Candidate;
 use super::simpler::simplify;
 use crate::budget::Step;
-use crate::model::hypothesis::{Effect, Hypothesis, Setting};
+use crate::model::hypothesis::{Effect, Hypothesis, Key, Setting};
 
 /// How a search is bounded.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +37,8 @@ pub struct Ask<'a, 'd> {
     pub plainly: &'a dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)>,
     /// Whether an unknown force on the machine explains what sets of more effects add to one that stands.
     pub pushed: &'a dyn Fn(&Hypothesis<'d>, &[Hypothesis<'d>]) -> bool,
+    /// Whether pairs of what could be missing in the simulation without effects were fitted before.
+    pub paired: bool,
 }
 
 /// Log evidence that another effect must add.
@@ -45,6 +48,9 @@ pub const LEAST_GAIN: f64 = 4.0;
 const PAIRS: (usize, usize) = (10, 4);
 /// Most rounds of drops and swaps: one may bring another best set, whose members have other rivals.
 const ROUNDS: usize = 4;
+
+/// Log evidence by which what is fitted in the place of a member may trail the best set after a few iterations and still be fitted to the end.
+const FAR_BEHIND: f64 = 100.0;
 
 /// Log evidence by which the second best set may trail and still have its members' rivals heard.
 const NEARLY: f64 = 6.0;
@@ -107,6 +113,7 @@ pub fn compose<'d>(
 ) {
     let Ask { unexplained, around, absorbed, .. } = ask;
     let enough = || setting.budget.omits(Step::Composition);
+    let mut looks = Looks::default();
     for depth in 2..=options.depth {
         if enough() {
             return;
@@ -117,24 +124,35 @@ pub fn compose<'d>(
         let best = pool[standing].log_evidence;
         let parents = beam(pool, depth - 1, options.beam);
         let mut found = if depth == 2 { parted(setting, none, pool, candidates) } else { Vec::new() };
-        if more && depth == 2 {
+        if more && depth == 2 && !ask.paired {
             found.extend(superposed(setting, none, candidates, options.most));
         }
         if !more {
             found.extend(unseen(setting, &pool[standing], &around(&pool[standing])));
         }
-        let beside = |parent: &Hypothesis<'d>| {
+        let beside = |&p: &usize| {
             if enough() {
-                return Vec::new();
+                return (None, Vec::new());
             }
-            let mut found = Vec::new();
+            let parent = &pool[p];
+            let (mut seen, mut found) = (None, Vec::new());
             if more {
-                found.extend(extended(setting, parent, &around(parent), options, None));
+                let candidates = around(parent);
+                let list = worth_adding(&candidates, options.most, None);
+                found.extend(refit_all(setting, parent, &list));
+                let fitted: Vec<Key> = list.iter().map(|c| c.key()).collect();
+                seen = Some((candidates, fitted));
             }
             found.extend(refit_all(setting, parent, &absorbed(parent).iter().collect::<Vec<_>>()));
-            found
+            (seen, found)
         };
-        found.par_extend(parents.into_par_iter().map(|p| &pool[p]).flat_map_iter(beside));
+        let extended: Vec<_> = parents.par_iter().map(beside).collect();
+        for (&p, (seen, sets)) in parents.iter().zip(extended) {
+            found.extend(sets);
+            if let Some((candidates, fitted)) = seen {
+                looks.keep(&pool[p], Some(candidates), fitted);
+            }
+        }
         if found.is_empty() {
             break;
         }
@@ -172,14 +190,24 @@ pub fn compose<'d>(
         let set = &pool[best];
         let instead = |(index, rest): &(usize, Hypothesis<'d>)| {
             if enough() {
-                return Vec::new();
+                return (None, Vec::new(), Vec::new());
             }
-            let candidates = around(rest);
-            let mut found = swapped(setting, none, set, *index, &candidates);
-            found.extend(extended(setting, rest, &candidates, options, Some(&set.effects[*index])));
-            found
+            let known = looks.around(rest);
+            let fresh = known.is_none().then(|| around(rest));
+            let candidates = known.map_or(fresh.as_deref().unwrap_or_default(), |look| &look.candidates);
+            let mut found = swapped(setting, none, set, *index, candidates);
+            let mut list = worth_adding(candidates, options.most, Some(&set.effects[*index]));
+            list.retain(|c| known.is_none_or(|look| !look.fitted.contains(&c.key())));
+            found.extend(refit_beside(setting, rest, &list, evidence - FAR_BEHIND));
+            let fitted: Vec<Key> = list.iter().map(|c| c.key()).collect();
+            (fresh, fitted, found)
         };
-        let mut found: Vec<Hypothesis<'d>> = rests.par_iter().flat_map_iter(instead).collect();
+        let replaced: Vec<_> = rests.par_iter().map(instead).collect();
+        let mut found = Vec::new();
+        for ((_, rest), (fresh, fitted, sets)) in rests.iter().zip(replaced) {
+            looks.keep(rest, fresh, fitted);
+            found.extend(sets);
+        }
         found.extend(rests.into_iter().map(|(_, rest)| rest));
         for h in found {
             add(pool, h);
@@ -292,22 +320,16 @@ fn recast<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, pool: &mut Vec<Hypot
     reached
 }
 
-/// A set with one more effect, for the likeliest of what could be missing around it, and for the family of the effect that was taken out.
-fn extended<'d>(
-    setting: &Setting<'d>,
-    parent: &Hypothesis<'d>,
-    candidates: &[Candidate],
-    options: SearchOptions,
-    dropped: Option<&Effect>,
-) -> Vec<Hypothesis<'d>> {
+/// The likeliest of what could be missing around a set, and the family of the effect that was taken out of it.
+fn worth_adding<'c>(candidates: &'c [Candidate], most: usize, dropped: Option<&Effect>) -> Vec<&'c Candidate> {
     if candidates.first().is_none_or(|c| c.score() < 2.0) {
         return Vec::new();
     }
-    let mut list = short_list(candidates, options.most);
+    let mut list = short_list(candidates, most);
     for rival in dropped.map_or_else(Vec::new, |d| rivals_of(d, candidates)) {
         include(&mut list, rival);
     }
-    refit_all(setting, parent, &list)
+    list
 }
 
 /// Adds a hypothesis, or replaces the same statement with less evidence; not one that states the same law twice.

@@ -73,6 +73,13 @@ fn unmoved(before: &[(Key, f64)], now: &[(Key, f64)]) -> bool {
     !now.is_empty() && now.iter().all(held)
 }
 
+/// Puts what a glance has fitted into a pool, and tells what it was.
+fn put<'d>(pool: &mut Vec<Hypothesis<'d>>, fitted: Vec<Hypothesis<'d>>) -> Vec<Key> {
+    let keys = fitted.iter().map(Hypothesis::key).collect();
+    fitted.into_iter().for_each(|h| add(pool, h));
+    keys
+}
+
 /// Looks for what is missing around a calibrated simulation; where that teaches something of the simulation itself, once more, up to so many
 /// times.
 pub fn explore<'a, 'd>(
@@ -119,6 +126,8 @@ pub fn explore<'a, 'd>(
     let plain_start = if heard { plainly.start(&none) } else { None };
     let (mut gross, under_white) = if murky { (plain_start, None) } else { (None, plain_start) };
     let mut pool = Vec::new();
+    // What of the pool a glance has fitted to the simulation from which the search goes on.
+    let mut glanced: Vec<Key> = Vec::new();
     // A coloured noise model takes part of a mismatch for noise: what plain squares would find is heard too.
     if let Some((start, found)) = &under_white {
         (hooks.progress)("refitting the likeliest effects without a noise model");
@@ -127,9 +136,14 @@ pub fn explore<'a, 'd>(
     if !significant {
         (hooks.progress)("taking a second look");
         let seen = match &gross {
-            Some((start, found)) => plainly.on_blocks(start, &plainly.glance(start, found)),
+            Some((start, found)) => {
+                let fitted = plainly.glance(start, found);
+                let seen = plainly.on_blocks(start, &fitted);
+                glanced = put(&mut pool, fitted);
+                seen
+            }
             None => {
-                search.glance(&none, &candidates).into_iter().for_each(|h| add(&mut pool, h));
+                glanced = put(&mut pool, search.glance(&none, &candidates));
                 search
                     .by_chance(&none, &pool, candidates.len())
                     .or_else(|| search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref()))
@@ -151,11 +165,12 @@ pub fn explore<'a, 'd>(
     let mut forced = None;
     let mut set_aside = None;
     if significant && let Some((start, found)) = gross.take() {
-        plainly.singles(&start, &found, &mut pool);
+        plainly.singles(&start, &found, &mut pool, &glanced);
         if let Some(lesson) = learned(&plainly, &start, &pool, Done::Singles) {
             return again(lesson);
         }
-        plainly.combine(&start, &found, &mut pool);
+        plainly.combine(&start, &found, &mut pool, !glanced.is_empty());
+        glanced.clear();
         let sets = search.under_noise(&none, &pool);
         let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
         if fine {
@@ -167,11 +182,11 @@ pub fn explore<'a, 'd>(
         }
     }
     if significant && gross.is_none() {
-        search.singles(&none, &candidates, &mut pool);
+        search.singles(&none, &candidates, &mut pool, &glanced);
         if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
             return again(lesson);
         }
-        search.combine(&none, &candidates, &mut pool);
+        search.combine(&none, &candidates, &mut pool, !glanced.is_empty());
         // A noise model under which the best set explains nothing has taken the mismatch for noise: plain squares decide after all.
         if let Some((start, found, sets)) = set_aside
             && best_of(&pool).is_some_and(|best| leaves_more(&pool[best], &start))

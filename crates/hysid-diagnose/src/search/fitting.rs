@@ -1,6 +1,7 @@
 //! Fitting effects: from a candidate of the screening, or a list of them, to a hypothesis.
 //!
-//! A few iterations tell who is hopeless; the others are fitted from several starts and to their end.
+//! A few iterations tell who is hopeless. The others are fitted from their first start; those that are near the best then go on from their other starts and to
+//! their end; of these the ones that are near the best look for another form of their law.
 
 use rayon::prelude::*;
 
@@ -33,7 +34,7 @@ fn sketch<'d>(
 
 /// Refits one candidate on top of a hypothesis' simulation.
 pub fn refit<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, candidate: &Candidate) -> Option<Hypothesis<'d>> {
-    refit_from(setting, parent, candidate, starting_values(setting, parent, candidate), None)
+    refit_from(setting, parent, candidate, &starting_values(setting, parent, candidate))
 }
 
 /// Refits a candidate whose law contains that of `special`, from where that one came to rest.
@@ -59,33 +60,56 @@ pub fn refit_wider<'d>(
         let x = found(&name).or_else(|| shape(&name)).or_else(|| amplitude(&name)).unwrap_or(x);
         set(&mut from, &wider.refit.simulation, &name, x);
     }
-    refit_from(setting, parent, wider, vec![from], None)
+    refit_from(setting, parent, wider, &[from])
 }
 
-/// Refits one candidate from these values; `begun` is a fit that has not converged and goes on in the place of the first of them.
+/// Refits one candidate from these values.
 fn refit_from<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'_>,
     candidate: &Candidate,
-    froms: Vec<Values>,
+    froms: &[Values],
+) -> Option<Hypothesis<'d>> {
+    let begun = from_the_first(setting, parent, candidate, froms, None);
+    let h = from_the_others(setting, parent, candidate, froms, begun)?;
+    Some(in_another_form(setting, parent, h))
+}
+
+/// A candidate fitted from the first of these values, where `sketched` is a fit from there that has not converged.
+fn from_the_first<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    froms: &[Values],
+    sketched: Option<Base<'d>>,
+) -> Option<Base<'d>> {
+    let noise = Some(&parent.base.whitener);
+    let Some(sketched) = sketched else {
+        return setting.fit(&candidate.refit.simulation, froms.first()?, noise, 1, setting.iterations);
+    };
+    let further = setting.further(&sketched, noise, 1, setting.iterations);
+    Some(further.filter(|base| base.log_likelihood > sketched.log_likelihood).unwrap_or(sketched))
+}
+
+/// The same from the others of these values, the best of all taken to its end.
+fn from_the_others<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    froms: &[Values],
     begun: Option<Base<'d>>,
 ) -> Option<Hypothesis<'d>> {
-    let document = &candidate.refit.simulation;
-    let mut best: Option<Base<'d>> = begun;
-    for (i, from) in froms.into_iter().enumerate() {
+    let noise = Some(&parent.base.whitener);
+    // Another start must come near the best in a few iterations to be followed.
+    let brief = if is_in_a_loop(candidate) { setting.iterations } else { 5 };
+    let mut best = begun;
+    for from in froms.iter().skip(1) {
         if best.is_some() && setting.budget.omits(Step::Fits) {
             break;
         }
-        // Another start must come near the best in a few iterations to be followed.
-        let brief = if i == 0 || is_in_a_loop(candidate) { setting.iterations } else { 5 };
-        let fitted = match &best {
-            Some(begun) if i == 0 => setting.further(begun, Some(&parent.base.whitener), 1, brief),
-            _ => setting.fit(document, &from, Some(&parent.base.whitener), 1, brief),
-        };
-        let Some(mut base) = fitted else { continue };
-        if i > 0 && best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood - 10.0) {
-            let longer = setting.further(&base, Some(&parent.base.whitener), 1, setting.iterations);
-            base = longer.unwrap_or(base);
+        let Some(mut base) = setting.fit(&candidate.refit.simulation, from, noise, 1, brief) else { continue };
+        if best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood - 10.0) {
+            base = setting.further(&base, noise, 1, setting.iterations).unwrap_or(base);
         }
         if best.as_ref().is_none_or(|b| base.log_likelihood > b.log_likelihood) {
             best = Some(base);
@@ -93,7 +117,12 @@ fn refit_from<'d>(
     }
     let mut h = hypothesis(setting, parent, candidate, best?);
     finish(setting, &mut h, parent.effects.len());
-    Some(finer(setting, parent, &h, parent.effects.len()).unwrap_or(h))
+    Some(h)
+}
+
+/// A fitted candidate in the form of its law that says most.
+fn in_another_form<'d>(setting: &Setting<'d>, parent: &Hypothesis<'_>, h: Hypothesis<'d>) -> Hypothesis<'d> {
+    finer(setting, parent, &h, parent.effects.len()).unwrap_or(h)
 }
 
 /// A fitted candidate as a hypothesis.
@@ -115,7 +144,7 @@ fn hypothesis<'d>(
 
 /// Candidates of a list that are fitted to the end.
 const MOST_COMPLETE: usize = 8;
-/// Log evidence by which a candidate may trail after a few iterations and still be refitted to the end.
+/// Log evidence by which a candidate may trail after a few iterations, and later after each stage of its fit, and still be refitted to the end.
 pub const HOPELESS: f64 = 40.0;
 
 /// A sketch that fits worse than the simulation without its effect is none of the effect's best: it has not come near a minimum, or it was fitted under a noise
@@ -138,38 +167,90 @@ fn brought_home<'d>(
     longer.filter(|h| h.log_evidence > sketched.log_evidence).unwrap_or(sketched)
 }
 
+/// The fit of one candidate of a list.
+struct UnderWay<'c, 'd> {
+    candidate: &'c Candidate,
+    froms: Vec<Values>,
+    /// As far as it has come; `None` where the simulation diverges.
+    fit: Option<Hypothesis<'d>>,
+    /// Whether it stays as it is: it is hopeless, or there is no time.
+    left: bool,
+}
+
+impl<'d> UnderWay<'_, 'd> {
+    fn reached(&self) -> Option<f64> {
+        self.fit.as_ref().map(|h| h.log_evidence)
+    }
+
+    /// Leaves it as it is where it trails; not within a loop.
+    fn leave_below(&mut self, threshold: f64) {
+        self.left |= self.reached().is_some_and(|e| e < threshold) && !is_in_a_loop(self.candidate);
+    }
+
+    /// From a few iterations to the end of the fit from the first start, unless it trails.
+    fn begin(&mut self, setting: &Setting<'d>, parent: &Hypothesis<'_>, threshold: f64) {
+        if self.left {
+            return;
+        }
+        self.fit = self.fit.take().map(|h| brought_home(setting, parent, self.candidate, h, threshold));
+        self.leave_below(threshold);
+        self.left |= setting.budget.omits(Step::Fits);
+        if !self.left {
+            let sketched = self.fit.take().map(|h| h.base);
+            let begun = from_the_first(setting, parent, self.candidate, &self.froms, sketched);
+            self.fit = begun.map(|base| hypothesis(setting, parent, self.candidate, base));
+        }
+    }
+}
+
+/// Leaves those as they are that trail the best by too much.
+fn leave_hopeless(all: &mut [UnderWay<'_, '_>]) {
+    let best = all.iter().filter_map(UnderWay::reached).fold(f64::NEG_INFINITY, f64::max);
+    all.iter_mut().for_each(|one| one.leave_below(best - HOPELESS));
+}
+
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
-///
-/// A few iterations from the best start tell who is hopeless (but within a loop of the simulation); the others are refitted to the end, from all their
-/// starts. The first is always begun, however little time there is.
 pub fn refit_all<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, list: &[&Candidate]) -> Vec<Hypothesis<'d>> {
-    let first: Vec<(Vec<Values>, Option<Hypothesis<'d>>)> = list
-        .par_iter()
-        .enumerate()
-        .map(|(i, c)| {
-            if i > 0 && setting.budget.omits(Step::Fits) {
-                return (Vec::new(), None);
-            }
-            let froms = starting_values(setting, parent, c);
-            let sketched = sketch(setting, parent, c, &froms).map(|base| hypothesis(setting, parent, c, base));
-            (froms, sketched)
-        })
-        .collect();
-    let mut order: Vec<f64> = first.iter().flat_map(|(_, h)| h).map(|h| h.log_evidence).collect();
+    refit_beside(setting, parent, list, f64::NEG_INFINITY)
+}
+
+/// The same where what has less log evidence than `least` after a few iterations is of no interest.
+///
+/// After a few iterations from the best start, after the fit from it, and after those from the other starts the hopeless ones are left as they are (but within a
+/// loop of the simulation). The first is always begun, however little time there is.
+pub fn refit_beside<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'d>,
+    list: &[&Candidate],
+    least: f64,
+) -> Vec<Hypothesis<'d>> {
+    let sketched = list.par_iter().enumerate().map(|(i, candidate)| {
+        if i > 0 && setting.budget.omits(Step::Fits) {
+            return UnderWay { candidate, froms: Vec::new(), fit: None, left: true };
+        }
+        let froms = starting_values(setting, parent, candidate);
+        let fit = sketch(setting, parent, candidate, &froms).map(|base| hypothesis(setting, parent, candidate, base));
+        UnderWay { candidate, froms, fit, left: false }
+    });
+    let mut all: Vec<UnderWay<'_, 'd>> = sketched.collect();
+    let mut order: Vec<f64> = all.iter().filter_map(UnderWay::reached).collect();
     order.sort_by(|a, b| b.total_cmp(a));
     let best = order.first().copied().unwrap_or(f64::NEG_INFINITY);
     let fourth = order.get(3).copied().unwrap_or(f64::NEG_INFINITY);
     let last = order.get(MOST_COMPLETE - 1).copied().unwrap_or(f64::NEG_INFINITY);
-    let threshold = (best - HOPELESS).min(fourth).max(last);
-    let mut out: Vec<Hypothesis<'d>> = list
-        .par_iter()
-        .zip(first)
-        .filter_map(|(c, (froms, sketched))| match sketched.map(|h| brought_home(setting, parent, c, h, threshold)) {
-            Some(h) if h.log_evidence < threshold && !is_in_a_loop(c) => Some(h),
-            sketched if setting.budget.omits(Step::Fits) => sketched,
-            sketched => refit_from(setting, parent, c, froms, sketched.map(|h| h.base)),
-        })
-        .collect();
+    let threshold = (best - HOPELESS).min(fourth).max(last).max(least);
+    all.par_iter_mut().for_each(|one| one.begin(setting, parent, threshold));
+    leave_hopeless(&mut all);
+    let underway = |one: &&mut UnderWay<'_, 'd>| !one.left;
+    all.par_iter_mut().filter(underway).for_each(|one| {
+        let begun = one.fit.take().map(|h| h.base);
+        one.fit = from_the_others(setting, parent, one.candidate, &one.froms, begun);
+    });
+    leave_hopeless(&mut all);
+    all.par_iter_mut().filter(underway).for_each(|one| {
+        one.fit = one.fit.take().map(|h| in_another_form(setting, parent, h));
+    });
+    let mut out: Vec<Hypothesis<'d>> = all.into_iter().filter_map(|one| one.fit).collect();
     out.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     out
 }

@@ -13,6 +13,7 @@ pub mod finish;
 pub mod fitting;
 pub mod gentle;
 pub mod joint;
+pub mod looks;
 pub mod numerics_check;
 pub mod parted;
 pub mod peaks;
@@ -124,11 +125,18 @@ impl<'a, 'd> Search<'a, 'd> {
         Some((start, candidates))
     }
 
-    /// Adds the effects that are fitted alone: the short list, its rivals, the numerics.
-    pub fn singles(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
+    /// Adds the effects that are fitted alone: the short list without those of the pool that were `glanced` at, its rivals, the numerics.
+    pub fn singles(
+        &self,
+        none: &Hypothesis<'d>,
+        candidates: &[Candidate],
+        pool: &mut Vec<Hypothesis<'d>>,
+        glanced: &[Key],
+    ) {
         (self.hooks.progress)("refitting the likeliest effects");
         let mut list = short_list(candidates, SHORT_LIST);
         candidates.iter().filter(|c| is_in_a_loop(c)).for_each(|c| include(&mut list, c));
+        list.retain(|c| !glanced.contains(&c.key()));
         for h in refit_all(&self.setting, none, &list) {
             add(pool, h);
         }
@@ -164,8 +172,14 @@ impl<'a, 'd> Search<'a, 'd> {
         keep_explaining(none, pool);
     }
 
-    /// Adds what composition makes of the sets there are.
-    pub fn combine(&self, none: &Hypothesis<'d>, candidates: &[Candidate], pool: &mut Vec<Hypothesis<'d>>) {
+    /// Adds what composition makes of the sets there are; `paired` says whether those are the pairs of a glance too.
+    pub fn combine(
+        &self,
+        none: &Hypothesis<'d>,
+        candidates: &[Candidate],
+        pool: &mut Vec<Hypothesis<'d>>,
+        paired: bool,
+    ) {
         (self.hooks.progress)("looking for a second and third effect");
         let unexplained = |h: &Hypothesis<'_>| {
             let test = self.remains(h);
@@ -181,8 +195,14 @@ impl<'a, 'd> Search<'a, 'd> {
             Some((h, found))
         };
         let pushed = |h: &Hypothesis<'d>, sets: &[Hypothesis<'d>]| self.is_pushed_rather(h, sets, candidates.len());
-        let hear =
-            Ask { unexplained: &unexplained, around: &around, absorbed: &absorbed, plainly: &plainly, pushed: &pushed };
+        let hear = Ask {
+            unexplained: &unexplained,
+            around: &around,
+            absorbed: &absorbed,
+            plainly: &plainly,
+            pushed: &pushed,
+            paired,
+        };
         compose(&self.setting, none, candidates, pool, bounds, &hear);
         keep_explaining(none, pool);
         held(&self.screened).take();

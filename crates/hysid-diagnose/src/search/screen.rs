@@ -83,6 +83,14 @@ impl Candidate {
         self.points.first().map_or(f64::NEG_INFINITY, |p| p.score)
     }
 
+    /// The same without the columns of its points, which take most of the memory.
+    pub fn bare(mut self) -> Self {
+        for point in &mut self.points {
+            (point.group, point.joint) = (None, None);
+        }
+        self
+    }
+
     /// Share of its response that the simulation's own parameters absorb, at its best point.
     pub fn concealment(&self) -> Option<f64> {
         self.points.first().map(|p| p.concealment)

@@ -11,7 +11,7 @@
 
 use hysid_plant::{Expr, Hold, Input, Simulation};
 
-use super::screen::{Along, Candidate, Point, screen_along};
+use super::screen::{Along, Candidate, screen_along};
 use crate::data::{DataSet, Stretch};
 use crate::mechanism::Mechanism;
 use crate::model::Model;
@@ -48,10 +48,7 @@ pub fn along_the_recording(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Can
     // What a sensor does to a motion is seen in the noise that the observer follows.
     let moves = |_: &Mechanism, slot: &Slot| matches!(slot.target, Target::Derivatives(_));
     let found = screen_along(base, along, &setting.original, &h.effects, &motion.evidence(), &moves);
-    let mut promising: Vec<Candidate> = found.into_iter().take_while(|c| c.score() > SCORE).take(MOST).collect();
-    let bare = |p: Point| Point { group: None, joint: None, ..p };
-    promising.iter_mut().for_each(|c| c.points = std::mem::take(&mut c.points).into_iter().map(bare).collect());
-    promising
+    found.into_iter().take_while(|c| c.score() > SCORE).take(MOST).map(Candidate::bare).collect()
 }
 
 /// Puts what was found along the recorded motion among the candidates: what is there already is fitted from there first.

@@ -1,0 +1,50 @@
+//! What was seen around sets of effects. Backward search comes back to sets that were extended before: what could be missing around them is known, and what
+//! was fitted beside them need not be fitted again.
+
+use super::screen::Candidate;
+use crate::model::hypothesis::{Hypothesis, Key};
+
+/// Log evidence within which two fits of one statement are the same fit.
+const SAME: f64 = 0.15;
+
+/// What was seen around one set.
+pub struct Look {
+    set: Key,
+    log_evidence: f64,
+    /// What could be missing, best score first, without the columns that only pairs and tests need.
+    pub candidates: Vec<Candidate>,
+    /// What was fitted beside the set.
+    pub fitted: Vec<Key>,
+}
+
+impl Look {
+    /// Around a set, with what was fitted beside it.
+    pub fn new(h: &Hypothesis<'_>, candidates: Vec<Candidate>, fitted: Vec<Key>) -> Self {
+        let candidates = candidates.into_iter().map(Candidate::bare).collect();
+        Self { set: h.key(), log_evidence: h.log_evidence, candidates, fitted }
+    }
+
+    fn is_of(&self, h: &Hypothesis<'_>) -> bool {
+        (self.log_evidence - h.log_evidence).abs() < SAME && self.set == h.key()
+    }
+}
+
+/// All that was seen, in the order in which it was.
+#[derive(Default)]
+pub struct Looks(Vec<Look>);
+
+impl Looks {
+    /// What was seen around this fit of a set.
+    pub fn around(&self, h: &Hypothesis<'_>) -> Option<&Look> {
+        self.0.iter().find(|look| look.is_of(h))
+    }
+
+    /// Keeps what was seen, together with what is known of the same fit.
+    pub fn keep(&mut self, h: &Hypothesis<'_>, candidates: Option<Vec<Candidate>>, fitted: Vec<Key>) {
+        match (self.0.iter_mut().find(|look| look.is_of(h)), candidates) {
+            (Some(known), _) => known.fitted.extend(fitted),
+            (None, Some(candidates)) => self.0.push(Look::new(h, candidates, fitted)),
+            (None, None) => {}
+        }
+    }
+}
