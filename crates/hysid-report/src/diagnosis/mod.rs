@@ -258,30 +258,35 @@ fn fits(page: &mut Page, file: &DiagnosisFile) {
     if file.fit.is_empty() {
         return;
     }
-    page.section(
-        "Free-run error on recordings that were never used",
-        "Before is the recalibrated simulation, never the first guess; after, with the effects in it. The black box is a NARX model without physics, identified from the same recordings and run on the same samples: where it is clearly better than the simulation after, something is still missing.",
-    );
-    let mut table = Table::new(&[
+    let black_box = file.fit.iter().any(|f| f.rmse_black_box.is_some());
+    let mut words =
+        "Before is the recalibrated simulation, never the first guess; after, with the effects in it.".to_owned();
+    if black_box {
+        words += " The black box is a NARX model without physics, identified from the same recordings and run on the same samples: where it is clearly better than the simulation after, something is still missing.";
+    }
+    page.section("Free-run error on recordings that were never used", &words);
+    let mut columns = vec![
         ("recording", Align::Left),
         ("output", Align::Left),
         ("before", Align::Right),
         ("after", Align::Right),
         ("after / before", Align::Right),
         ("95 % interval", Align::Right),
-        ("black box", Align::Right),
-    ]);
+    ];
+    columns.extend(black_box.then_some(("black box", Align::Right)));
+    let mut table = Table::new(&columns);
     let some = |v: Option<f64>| v.map(number).unwrap_or_default();
     for f in &file.fit {
-        table.row([
+        let mut row = vec![
             f.recording.clone(),
             f.output.clone(),
             some(f.rmse_before),
             some(f.rmse_after),
             some(f.ratio),
             interval(f.ratio_low, f.ratio_high),
-            some(f.rmse_black_box),
-        ]);
+        ];
+        row.extend(black_box.then(|| some(f.rmse_black_box)));
+        table.row(row);
     }
     page.table(&table);
 }
