@@ -18,12 +18,6 @@ pub struct Look {
 }
 
 impl Look {
-    /// Around a set, with what was fitted beside it.
-    pub fn new(h: &Hypothesis<'_>, candidates: Vec<Candidate>, fitted: Vec<Key>) -> Self {
-        let candidates = candidates.into_iter().map(Candidate::bare).collect();
-        Self { set: h.key(), log_evidence: h.log_evidence, candidates, fitted }
-    }
-
     fn is_of(&self, h: &Hypothesis<'_>) -> bool {
         (self.log_evidence - h.log_evidence).abs() < SAME && self.set == h.key()
     }
@@ -43,7 +37,10 @@ impl Looks {
     pub fn keep(&mut self, h: &Hypothesis<'_>, candidates: Option<Vec<Candidate>>, fitted: Vec<Key>) {
         match (self.0.iter_mut().find(|look| look.is_of(h)), candidates) {
             (Some(known), _) => known.fitted.extend(fitted),
-            (None, Some(candidates)) => self.0.push(Look::new(h, candidates, fitted)),
+            (None, Some(candidates)) => {
+                let candidates = candidates.into_iter().map(Candidate::bare).collect();
+                self.0.push(Look { set: h.key(), log_evidence: h.log_evidence, candidates, fitted });
+            }
             (None, None) => {}
         }
     }
