@@ -28,7 +28,7 @@ fn sketch<'d>(
         .iter()
         .enumerate()
         .filter(|(i, _)| *i < first || (*i + 2 >= froms.len() && parent.base.far()))
-        .filter_map(|(_, from)| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, 3))
+        .filter_map(|(_, from)| setting.fit(&candidate.refit.simulation, from, Some(&parent.base.whitener), 1, SKETCH))
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
@@ -147,6 +147,40 @@ const MOST_COMPLETE: usize = 8;
 /// Log evidence by which a candidate may trail after a few iterations, and later after each stage of its fit, and still be refitted to the end.
 pub const HOPELESS: f64 = 40.0;
 
+/// Shapes from which on a few iterations tell little of a law: between the points of its grid its likelihood is bent. It goes on by as many as long as each time
+/// takes it this share of the way to what it trails.
+const BENT: usize = 2;
+const CLIMBING: f64 = 0.2;
+/// Iterations of a sketch.
+const SKETCH: usize = 3;
+
+/// A sketch of a law with several shapes that trails, taken on as long as it climbs.
+fn climbed<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    mut sketched: Hypothesis<'d>,
+    threshold: f64,
+) -> Hypothesis<'d> {
+    let bent = candidate.refit.shapes.len() >= BENT;
+    for _ in 0..setting.iterations / SKETCH {
+        let short = threshold - sketched.log_evidence;
+        if !bent || short <= 0.0 || setting.budget.omits(Step::Fits) {
+            break;
+        }
+        let longer = setting.further(&sketched.base, Some(&parent.base.whitener), 1, SKETCH);
+        let Some(longer) = longer.map(|base| hypothesis(setting, parent, candidate, base)) else { break };
+        let gain = longer.log_evidence - sketched.log_evidence;
+        if gain > 0.0 {
+            sketched = longer;
+        }
+        if gain < CLIMBING * short {
+            break;
+        }
+    }
+    sketched
+}
+
 /// A sketch that fits worse than the simulation without its effect is none of the effect's best: it has not come near a minimum, or it was fitted under a noise
 /// that is no longer there (where 1/f noise hid a drift, the mean was free). Where the effect promised more than the threshold it is fitted on, under the noise
 /// that it leaves.
@@ -192,7 +226,9 @@ impl<'d> UnderWay<'_, 'd> {
         if self.left {
             return;
         }
-        self.fit = self.fit.take().map(|h| brought_home(setting, parent, self.candidate, h, threshold));
+        let candidate = self.candidate;
+        self.fit = self.fit.take().map(|h| climbed(setting, parent, candidate, h, threshold));
+        self.fit = self.fit.take().map(|h| brought_home(setting, parent, candidate, h, threshold));
         self.leave_below(threshold);
         self.left |= setting.budget.omits(Step::Fits);
         if !self.left {
