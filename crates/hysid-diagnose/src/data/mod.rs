@@ -218,7 +218,8 @@ impl DataSet {
         let outputs = || self.stretches.iter().flat_map(|s| s.outputs.iter().map(Vec::as_slice));
         let wanted = step(outputs(), self.period_s, self.samples());
         let fed_back = |s: &Stretch| s.drive.inputs().iter().any(|u| s.outputs.iter().any(|y| together(u, y, wanted)));
-        if wanted > 1 && self.stretches.iter().any(fed_back) {
+        if wanted > 1 && (self.stretches.iter().any(fed_back) || (0..self.layout.outputs).any(|o| self.is_in_steps(o)))
+        {
             return 1;
         }
         // Between gaps there must be rows enough: what is too short for a series is left out.

@@ -10,6 +10,8 @@ use crate::mechanism::{mean, rms};
 pub const OFF_A_STEP: f64 = 0.1;
 /// Rounding of fine steps in standard deviations of what is recorded, at most: that of a sensor's noise. Beyond it the recording is stairs.
 const FINE: f64 = 0.06;
+/// Share of the samples that are read on the same step as the one before, from which on no noise before the converter hides its steps.
+const REPEATED: f64 = 0.5;
 /// Levels from which on it can be seen that they lie on steps.
 const LEVELS: usize = 12;
 /// Period of a ripple, in steps by which its position is read, from which on it is one: what repeats with the steps is what the rounding does.
@@ -39,6 +41,19 @@ impl DataSet {
         fine_steps(self.stretches.iter().flat_map(|s| s.outputs[output].iter().copied()))
     }
 
+    /// Whether a fine converter's rounding is what noise an output has: most samples are read on the step of the one before, and a mean over some of them
+    /// is no longer what was read.
+    pub fn is_in_steps(&self, output: usize) -> bool {
+        let pairs = || {
+            self.stretches
+                .iter()
+                .flat_map(|s| s.outputs[output].windows(2))
+                .filter(|p| p[0].is_finite() && p[1].is_finite())
+        };
+        let repeated = pairs().filter(|p| p[0] == p[1]).count();
+        repeated as f64 > REPEATED * pairs().count() as f64 && self.steps(output).is_some()
+    }
+
     /// The states of a simulation that fine converters read by themselves, and the shortest period over each that a ripple can have.
     pub fn read_in_steps(&self, simulation: &Simulation) -> Vec<(String, f64)> {
         let Ok(compiled) = Compiled::new(simulation) else { return Vec::new() };
@@ -55,6 +70,7 @@ impl DataSet {
 
 #[cfg(test)]
 mod tests {
+    use super::super::samples::{recording, simulation};
     use super::*;
     use crate::oscillator::normal;
 
@@ -67,5 +83,21 @@ mod tests {
         let mut random = normal(3);
         assert_eq!(fine_steps((0..900).map(|_| random())), None);
         assert_eq!(fine_steps(std::iter::repeat_n(1.0, 9)), None);
+    }
+
+    #[test]
+    fn what_was_read_in_steps_is_compared_as_it_was_read() {
+        let n = 20_000;
+        let slow = |noise: f64| {
+            let mut random = normal(3);
+            let y = (0..n).map(|i| (40.0 * (0.012 * f64::from(i)).sin() + noise * random()).round());
+            let mut simulation = simulation();
+            simulation.time.clock = hysid_plant::ClockSource::Period(1e-3);
+            DataSet::new(&simulation, &[recording(vec![0.0; n as usize], y.collect())], 1).unwrap()
+        };
+        let read = slow(0.0);
+        assert!(read.is_in_steps(0) && read.own_step() == 1);
+        let noisy = slow(0.6);
+        assert!(!noisy.is_in_steps(0) && noisy.own_step() > 1);
     }
 }

@@ -146,6 +146,7 @@ pub fn explore<'a, 'd>(
                 glanced = put(&mut pool, search.glance(&none, &candidates));
                 search
                     .by_chance(&none, &pool, candidates.len())
+                    .or_else(|| search.by_steps(&none, &pool, candidates.len()))
                     .or_else(|| search.by_rehearsal(&none, &pool, &candidates, under_white.as_ref()))
             }
         };
@@ -186,7 +187,9 @@ pub fn explore<'a, 'd>(
         if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
             return again(lesson);
         }
-        search.combine(&none, &candidates, &mut pool, !glanced.is_empty());
+        if !search.is_read(&pool) {
+            search.combine(&none, &candidates, &mut pool, !glanced.is_empty());
+        }
         // A noise model under which the best set explains nothing has taken the mismatch for noise: plain squares decide after all.
         if let Some((start, found, sets)) = set_aside
             && best_of(&pool).is_some_and(|best| leaves_more(&pool[best], &start))

@@ -31,8 +31,9 @@ const BESIDE: f64 = 0.05;
 /// What is left in steps where one sample of fifty is read as the next step, as what is a tenth of the rounding makes it. The right law does no worse: where
 /// it comes near the middle between two steps the last digits of its parameters decide, and a normal distribution grants all there is for each such sample.
 const NO_WORSE: f64 = 0.15;
-/// Sets that are fitted beside the converters, and log evidence by which they may trail the best.
+/// Sets that are fitted beside the converters, single effects that are, and log evidence by which sets may trail the best.
 const SETS: usize = 8;
+const SINGLES: usize = 5;
 const TRAIL: f64 = 30.0;
 
 /// An effect that is the rounding of a fine converter.
@@ -109,6 +110,34 @@ impl<'d> Search<'_, 'd> {
         pool.iter().position(|h| !converters.is_empty() && h.key() == key)
     }
 
+    /// A bound for the probability that a fitted set reads the samples as they were recorded where nothing is missing; `None` where no set does, or the
+    /// simulation as it is does as well, or nothing is rounded. Where no noise was rounded, rounding hides what the steps themselves tell.
+    pub fn by_steps(&self, none: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
+        if !self.all_in_steps() {
+            return None;
+        }
+        let alone = beside_converters(&self.setting, none).filter(|alone| !self.leaves_nothing(alone))?;
+        let best = self.reading(fitted).map(|h| h.log_evidence).reduce(|| f64::NEG_INFINITY, f64::max);
+        let chance = candidates.max(1) as f64 * (alone.log_evidence - best).exp();
+        (best > alone.log_evidence && chance < self.options.alpha).then_some(chance)
+    }
+
+    /// Whether a set of those that were fitted reads the samples as they were recorded: a larger one is not needed.
+    pub fn is_read(&self, fitted: &[Hypothesis<'d>]) -> bool {
+        self.all_in_steps() && self.reading(fitted).any(|_| true)
+    }
+
+    /// Whether the rounding of a fine converter is much of what is left of each output.
+    fn all_in_steps(&self) -> bool {
+        self.setting.rounded.len() == self.setting.original.outputs.len()
+    }
+
+    /// The likeliest of some sets beside the converters, of these the ones that read the samples as they were recorded.
+    fn reading<'s>(&'s self, fitted: &'s [Hypothesis<'d>]) -> impl ParallelIterator<Item = Hypothesis<'d>> + 's {
+        let beside = likeliest(fitted).into_par_iter().filter_map(|h| beside_converters(&self.setting, h));
+        beside.filter(|h| self.leaves_nothing(h))
+    }
+
     /// What to tell where the rounding of fine converters explains what is left, and nothing that was found stands beside it: neither where that is noise as
     /// any other, nor where it is written; `candidates` are so many. What does stand is added to the pool with the converters beside it.
     pub fn by_rounding(
@@ -122,15 +151,13 @@ impl<'d> Search<'_, 'd> {
         if explained < EXPLAINS {
             return None;
         }
-        let mut order: Vec<&Hypothesis<'d>> = pool.iter().filter(|h| !h.effects.is_empty()).collect();
-        order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-        let best = best_of(pool).map(|b| &pool[b]);
-        order.retain(|h| best.is_some_and(|b| h.log_evidence > b.log_evidence - TRAIL));
-        order.truncate(SETS);
+        let order = likeliest(pool);
         let seen = self.likeliest(none, &order, candidates).is_some_and(|(p, _)| p < self.options.alpha);
         let setting = &self.setting;
         let mut beside: Vec<Hypothesis<'d>> =
-            order.into_par_iter().filter(|_| seen).filter_map(|h| beside_converters(setting, h)).collect();
+            order.into_par_iter().filter_map(|h| beside_converters(setting, h)).collect();
+        // What rounding hides is seen by its steps.
+        beside.retain(|h| seen || (self.leaves_nothing(h) && !self.leaves_nothing(&alone)));
         let complete = beside.iter().filter(|h| self.leaves_nothing(h)).map(|h| h.effects.len()).min();
         beside.retain(|h| complete.is_none_or(|fewest| h.effects.len() <= fewest));
         let least = alone.log_evidence + (EXPLAINS + (candidates.max(1) as f64).ln()).max(BESIDE * explained);
@@ -143,6 +170,24 @@ impl<'d> Search<'_, 'd> {
             Converter::list(&self.converters(&alone))
         ))
     }
+}
+
+/// The sets of a pool that are worth a fit beside the converters.
+fn likeliest<'h, 'd>(pool: &'h [Hypothesis<'d>]) -> Vec<&'h Hypothesis<'d>> {
+    let mut order: Vec<&Hypothesis<'d>> = pool.iter().filter(|h| !h.effects.is_empty()).collect();
+    order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+    let best = best_of(pool).map(|b| &pool[b]);
+    // Larger sets may follow what a single one leaves of the rounding.
+    let (mut singles, mut sets) = (0, 0);
+    order.retain(|h| {
+        let single = h.effects.len() == 1;
+        let near = best.is_some_and(|b| h.log_evidence > b.log_evidence - TRAIL);
+        let keep = (single && singles < SINGLES) || (near && sets < SETS);
+        singles += usize::from(single);
+        sets += usize::from(near);
+        keep
+    });
+    order
 }
 
 /// A set with the converters of the recording written into it; `None` where it has none.
@@ -188,18 +233,44 @@ mod tests {
         (recorded(&Simulation::parse(BASELINE, "test.sim.toml").unwrap(), PERIOD, [("u_N", u), ("x_m", y)]), q)
     }
 
-    /// Whether the rounding of such a recording is all that is left.
-    fn all(steps: f64, noise: [f64; 2], force: impl Fn(f64, f64) -> f64) -> bool {
+    /// What is asked of the search on such a recording, of the simulation as it is and of it with dry friction.
+    fn asked<T>(
+        steps: f64,
+        noise: [f64; 2],
+        force: impl Fn(f64, f64) -> f64,
+        ask: impl for<'d> FnOnce(&Search<'_, 'd>, &Hypothesis<'d>, Vec<Hypothesis<'d>>) -> T,
+    ) -> T {
         let (data, _) = converted(steps, noise, force);
         let budget = Budget::new(&|_| false);
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let (mut setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
         setting.rounded = rounded(&setting, &none.base);
         let search = Search::new(setting, Options::default(), &Hooks::SILENT);
-        let asked = |id: &str, slot: &str| search.answer(&none, &vec![(id.to_owned(), slot.to_owned())]);
-        let friction = asked("coulomb_friction", "state:v");
-        search.by_rounding(&none, &mut Vec::from_iter(friction), 50).is_some()
+        let friction = search.answer(&none, &vec![("coulomb_friction".to_owned(), "state:v".to_owned())]);
+        ask(&search, &none, Vec::from_iter(friction))
     }
+
+    /// Whether the rounding of such a recording is all that is left.
+    fn all(steps: f64, noise: [f64; 2], force: impl Fn(f64, f64) -> f64) -> bool {
+        asked(steps, noise, force, |search, none, mut pool| search.by_rounding(none, &mut pool, 50).is_some())
+    }
+
+    #[test]
+    fn a_weak_friction_that_rounding_hides_is_seen_by_the_steps() {
+        let seen = |noise: f64, friction: f64| {
+            let force = |_: f64, v: f64| friction * v.signum();
+            asked(50.0, [noise, 0.0], force, |search, none, pool| {
+                assert_eq!(search.is_read(&pool), noise == 0.0, "{noise} {friction}");
+                [search.by_chance(none, &pool, 50), search.by_steps(none, &pool, 50)].map(|p| p.is_some())
+            })
+        };
+        assert_eq!(seen(0.0, WEAK), [false, true]);
+        assert_eq!(seen(0.3, WEAK), [false, false], "noise that is rounded too");
+        assert_eq!(seen(0.0, 0.0), [false, false], "the simulation as it is reads them as well");
+    }
+
+    /// A dry friction that changes few of the samples that are read, in N.
+    const WEAK: f64 = 0.03;
 
     #[test]
     fn a_fine_converter_alone_leaves_nothing_and_is_no_mismatch() {

@@ -78,7 +78,8 @@ impl<'d> Judgement<'d> {
         let mut support = firmness(pool, &weighed, &probability, winner, rest.imperfect);
         let best = &pool[winner];
         // Where something is left, or rivals were not heard, nothing is firm anyway, and what is missing looks like a strength that varies.
-        let uneven = if rest.imperfect || unfinished() {
+        // Where the samples are read as they were recorded, the last digits of two integrators do.
+        let uneven = if rest.imperfect || unfinished() || search.leaves_nothing(best) {
             vec![None; best.effects.len()]
         } else {
             uneven(&best.base, setting.noise, &best.effects)
