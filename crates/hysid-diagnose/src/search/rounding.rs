@@ -134,7 +134,7 @@ impl<'d> Search<'_, 'd> {
 
     /// The likeliest of some sets beside the converters, of these the ones that read the samples as they were recorded.
     fn reading<'s>(&'s self, fitted: &'s [Hypothesis<'d>]) -> impl ParallelIterator<Item = Hypothesis<'d>> + 's {
-        let beside = likeliest(fitted).into_par_iter().filter_map(|h| beside_converters(&self.setting, h));
+        let beside = worth_a_fit(fitted).into_par_iter().filter_map(|h| beside_converters(&self.setting, h));
         beside.filter(|h| self.leaves_nothing(h))
     }
 
@@ -151,7 +151,7 @@ impl<'d> Search<'_, 'd> {
         if explained < EXPLAINS {
             return None;
         }
-        let order = likeliest(pool);
+        let order = worth_a_fit(pool);
         let seen = self.likeliest(none, &order, candidates).is_some_and(|(p, _)| p < self.options.alpha);
         let setting = &self.setting;
         let mut beside: Vec<Hypothesis<'d>> =
@@ -173,7 +173,7 @@ impl<'d> Search<'_, 'd> {
 }
 
 /// The sets of a pool that are worth a fit beside the converters.
-fn likeliest<'h, 'd>(pool: &'h [Hypothesis<'d>]) -> Vec<&'h Hypothesis<'d>> {
+fn worth_a_fit<'h, 'd>(pool: &'h [Hypothesis<'d>]) -> Vec<&'h Hypothesis<'d>> {
     let mut order: Vec<&Hypothesis<'d>> = pool.iter().filter(|h| !h.effects.is_empty()).collect();
     order.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     let best = best_of(pool).map(|b| &pool[b]);
