@@ -118,7 +118,8 @@ impl<'d> Search<'_, 'd> {
         }
         let alone = beside_converters(&self.setting, none).filter(|alone| !self.leaves_nothing(alone))?;
         let best = self.reading(fitted).map(|h| h.log_evidence).reduce(|| f64::NEG_INFINITY, f64::max);
-        let chance = candidates.max(1) as f64 * (alone.log_evidence - best).exp();
+        // A bound is never zero, however many steps tell.
+        let chance = (candidates.max(1) as f64 * (alone.log_evidence - best).exp()).max(f64::MIN_POSITIVE);
         (best > alone.log_evidence && chance < self.options.alpha).then_some(chance)
     }
 

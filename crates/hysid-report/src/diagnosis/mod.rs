@@ -97,7 +97,9 @@ fn effects(page: &mut Page, file: &DiagnosisFile) {
     let intro = match file.verdict {
         VerdictKind::Named => "",
         VerdictKind::Family => "The family is firm, the member is not; the likeliest member is shown.",
-        VerdictKind::Ambiguous => "Several families remain; the likeliest explanation is shown, its rivals are below.",
+        VerdictKind::Ambiguous => {
+            "The likeliest explanation is shown, not all of it firm; what else was weighed is below."
+        }
         _ => "The catalogue's best explanation; it does not explain everything.",
     };
     page.section("What is missing", intro);
