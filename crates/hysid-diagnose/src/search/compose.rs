@@ -6,13 +6,13 @@ use super::assemble::{Part, assemble, complete, without};
 use super::finer::{finer, inherited};
 use super::fitting::{HOPELESS, refit_all, refit_beside};
 use super::joint::pairs;
-use super::looks::Looks;
+use super::looks::{Looks, Seen};
 use super::parted::parted;
 use super::rivals::{include, rivals_of, short_list};
 use super::screen::Candidate;
 use super::simpler::simplify;
 use crate::budget::Step;
-use crate::model::hypothesis::{Effect, Hypothesis, Key, Setting};
+use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
 /// How a search is bounded.
 #[derive(Debug, Clone, Copy)]
@@ -131,27 +131,24 @@ pub fn compose<'d>(
             found.extend(unseen(setting, &pool[standing], &around(&pool[standing])));
         }
         let beside = |&p: &usize| {
+            let mut seen = Seen::default();
             if enough() {
-                return (None, Vec::new());
+                return seen;
             }
             let parent = &pool[p];
-            let (mut seen, mut found) = (None, Vec::new());
             if more {
                 let candidates = around(parent);
                 let list = worth_adding(&candidates, options.most, None);
-                found.extend(refit_all(setting, parent, &list));
-                let fitted: Vec<Key> = list.iter().map(|c| c.key()).collect();
-                seen = Some((candidates, fitted));
+                seen.found.extend(refit_all(setting, parent, &list));
+                seen.fitted.extend(list.iter().map(|c| c.key()));
+                seen.fresh = Some(candidates);
             }
-            found.extend(refit_all(setting, parent, &absorbed(parent).iter().collect::<Vec<_>>()));
-            (seen, found)
+            seen.found.extend(refit_all(setting, parent, &absorbed(parent).iter().collect::<Vec<_>>()));
+            seen
         };
         let extended: Vec<_> = parents.par_iter().map(beside).collect();
-        for (&p, (seen, sets)) in parents.iter().zip(extended) {
-            found.extend(sets);
-            if let Some((candidates, fitted)) = seen {
-                looks.keep(&pool[p], Some(candidates), fitted);
-            }
+        for (&p, seen) in parents.iter().zip(extended) {
+            found.extend(looks.keep(&pool[p], seen));
         }
         if found.is_empty() {
             break;
@@ -190,7 +187,7 @@ pub fn compose<'d>(
         let set = &pool[best];
         let instead = |(index, rest): &(usize, Hypothesis<'d>)| {
             if enough() {
-                return (None, Vec::new(), Vec::new());
+                return Seen::default();
             }
             let known = looks.around(rest);
             let fresh = known.is_none().then(|| around(rest));
@@ -199,14 +196,13 @@ pub fn compose<'d>(
             let mut list = worth_adding(candidates, options.most, Some(&set.effects[*index]));
             list.retain(|c| known.is_none_or(|look| !look.fitted.contains(&c.key())));
             found.extend(refit_beside(setting, rest, &list, evidence - FAR_BEHIND));
-            let fitted: Vec<Key> = list.iter().map(|c| c.key()).collect();
-            (fresh, fitted, found)
+            let fitted = list.iter().map(|c| c.key()).collect();
+            Seen { fresh, fitted, found }
         };
         let replaced: Vec<_> = rests.par_iter().map(instead).collect();
         let mut found = Vec::new();
-        for ((_, rest), (fresh, fitted, sets)) in rests.iter().zip(replaced) {
-            looks.keep(rest, fresh, fitted);
-            found.extend(sets);
+        for ((_, rest), seen) in rests.iter().zip(replaced) {
+            found.extend(looks.keep(rest, seen));
         }
         found.extend(rests.into_iter().map(|(_, rest)| rest));
         for h in found {

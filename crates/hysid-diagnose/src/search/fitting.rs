@@ -10,6 +10,7 @@ use super::finish::finish;
 use super::screen::{Candidate, with_added_starts};
 use super::starts::{is_in_a_loop, set, starting_values, starts, strength_in_shapes};
 use crate::budget::Step;
+use crate::evidence::Whitener;
 use crate::model::Values;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
@@ -154,6 +155,19 @@ const CLIMBING: f64 = 0.2;
 /// Iterations of a sketch.
 const SKETCH: usize = 3;
 
+/// A fit that is taken on by so many iterations under this noise; `None` where it gains nothing.
+fn taken_on<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'_>,
+    candidate: &Candidate,
+    fit: &Hypothesis<'d>,
+    noise: &Whitener,
+    iterations: usize,
+) -> Option<Hypothesis<'d>> {
+    let base = setting.further(&fit.base, Some(noise), 1, iterations)?;
+    Some(hypothesis(setting, parent, candidate, base)).filter(|h| h.log_evidence > fit.log_evidence)
+}
+
 /// A sketch of a law with several shapes that trails, taken on as long as it climbs.
 fn climbed<'d>(
     setting: &Setting<'d>,
@@ -162,18 +176,18 @@ fn climbed<'d>(
     mut sketched: Hypothesis<'d>,
     threshold: f64,
 ) -> Hypothesis<'d> {
-    let bent = candidate.refit.shapes.len() >= BENT;
+    if candidate.refit.shapes.len() < BENT {
+        return sketched;
+    }
     for _ in 0..setting.iterations / SKETCH {
         let short = threshold - sketched.log_evidence;
-        if !bent || short <= 0.0 || setting.budget.omits(Step::Fits) {
+        if short <= 0.0 || setting.budget.omits(Step::Fits) {
             break;
         }
-        let longer = setting.further(&sketched.base, Some(&parent.base.whitener), 1, SKETCH);
-        let Some(longer) = longer.map(|base| hypothesis(setting, parent, candidate, base)) else { break };
+        let noise = &parent.base.whitener;
+        let Some(longer) = taken_on(setting, parent, candidate, &sketched, noise, SKETCH) else { break };
         let gain = longer.log_evidence - sketched.log_evidence;
-        if gain > 0.0 {
-            sketched = longer;
-        }
+        sketched = longer;
         if gain < CLIMBING * short {
             break;
         }
@@ -195,10 +209,8 @@ fn brought_home<'d>(
     if !strayed || parent.log_evidence + candidate.score() < threshold || setting.budget.omits(Step::Fits) {
         return sketched;
     }
-    let own = Some(&sketched.base.whitener);
-    let longer = setting.further(&sketched.base, own, 1, setting.iterations);
-    let longer = longer.map(|base| hypothesis(setting, parent, candidate, base));
-    longer.filter(|h| h.log_evidence > sketched.log_evidence).unwrap_or(sketched)
+    let own = &sketched.base.whitener;
+    taken_on(setting, parent, candidate, &sketched, own, setting.iterations).unwrap_or(sketched)
 }
 
 /// The fit of one candidate of a list.
@@ -227,14 +239,14 @@ impl<'d> UnderWay<'_, 'd> {
             return;
         }
         let candidate = self.candidate;
-        self.fit = self.fit.take().map(|h| climbed(setting, parent, candidate, h, threshold));
-        self.fit = self.fit.take().map(|h| brought_home(setting, parent, candidate, h, threshold));
+        let climbed = self.fit.take().map(|h| climbed(setting, parent, candidate, h, threshold));
+        self.fit = climbed.map(|h| brought_home(setting, parent, candidate, h, threshold));
         self.leave_below(threshold);
         self.left |= setting.budget.omits(Step::Fits);
         if !self.left {
             let sketched = self.fit.take().map(|h| h.base);
-            let begun = from_the_first(setting, parent, self.candidate, &self.froms, sketched);
-            self.fit = begun.map(|base| hypothesis(setting, parent, self.candidate, base));
+            let begun = from_the_first(setting, parent, candidate, &self.froms, sketched);
+            self.fit = begun.map(|base| hypothesis(setting, parent, candidate, base));
         }
     }
 }

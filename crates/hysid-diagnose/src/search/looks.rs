@@ -23,6 +23,17 @@ impl Look {
     }
 }
 
+/// What one more look at a set brings.
+#[derive(Default)]
+pub struct Seen<'d> {
+    /// What could be missing, where that was not known.
+    pub fresh: Option<Vec<Candidate>>,
+    /// What was fitted beside the set.
+    pub fitted: Vec<Key>,
+    /// The sets that were fitted, beside it or in the place of one of its members.
+    pub found: Vec<Hypothesis<'d>>,
+}
+
 /// All that was seen, in the order in which it was.
 #[derive(Default)]
 pub struct Looks(Vec<Look>);
@@ -33,9 +44,10 @@ impl Looks {
         self.0.iter().find(|look| look.is_of(h))
     }
 
-    /// Keeps what was seen, together with what is known of the same fit.
-    pub fn keep(&mut self, h: &Hypothesis<'_>, candidates: Option<Vec<Candidate>>, fitted: Vec<Key>) {
-        match (self.0.iter_mut().find(|look| look.is_of(h)), candidates) {
+    /// Keeps what was seen, together with what is known of the same fit; the sets that came of it are given back.
+    pub fn keep<'d>(&mut self, h: &Hypothesis<'_>, seen: Seen<'d>) -> Vec<Hypothesis<'d>> {
+        let Seen { fresh, fitted, found } = seen;
+        match (self.0.iter_mut().find(|look| look.is_of(h)), fresh) {
             (Some(known), _) => known.fitted.extend(fitted),
             (None, Some(candidates)) => {
                 let candidates = candidates.into_iter().map(Candidate::bare).collect();
@@ -43,5 +55,6 @@ impl Looks {
             }
             (None, None) => {}
         }
+        found
     }
 }

@@ -154,11 +154,12 @@ impl<'d> Search<'_, 'd> {
         }
         let order = worth_a_fit(pool);
         let seen = self.likeliest(none, &order, candidates).is_some_and(|(p, _)| p < self.options.alpha);
+        // What rounding hides is seen by its steps, where those of the simulation as it is leave something.
+        let heard = seen || !self.leaves_nothing(&alone);
         let setting = &self.setting;
         let mut beside: Vec<Hypothesis<'d>> =
-            order.into_par_iter().filter_map(|h| beside_converters(setting, h)).collect();
-        // What rounding hides is seen by its steps.
-        beside.retain(|h| seen || (self.leaves_nothing(h) && !self.leaves_nothing(&alone)));
+            order.into_par_iter().filter(|_| heard).filter_map(|h| beside_converters(setting, h)).collect();
+        beside.retain(|h| seen || self.leaves_nothing(h));
         let complete = beside.iter().filter(|h| self.leaves_nothing(h)).map(|h| h.effects.len()).min();
         beside.retain(|h| complete.is_none_or(|fewest| h.effects.len() <= fewest));
         let least = alone.log_evidence + (EXPLAINS + (candidates.max(1) as f64).ln()).max(BESIDE * explained);
