@@ -26,6 +26,7 @@ use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
 use crate::search::profile::{centre_moments, take_intervals};
 use crate::search::rounding::Converter;
+use crate::search::shaken::shake;
 use crate::slot::{with_balances, with_turns, with_used_turns};
 use crate::text::number;
 use crate::verdict::judgement::Judgement;
@@ -82,6 +83,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     (hooks.accepted)();
     setting.own_unknowns = base.model.count();
     let mut found = explore(&setting, base, request, hooks, LESSONS);
+    shake(&found.search.setting, &mut found.pool, request.options.seed);
     let most = found.pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     for h in found.pool.iter_mut().filter(|h| h.log_evidence > most - COULD_STAND) {
         centre_moments(&found.search.setting, h);

@@ -25,6 +25,7 @@ pub mod rivals;
 pub mod rounding;
 pub mod screen;
 pub mod second_look;
+pub mod shaken;
 pub mod simpler;
 pub mod starts;
 pub mod tracked;
