@@ -1,6 +1,6 @@
 //! Sets of effects written into a simulation together: from parts with start values to a hypothesis, on to its end, and without one of them.
 
-use super::finish::finish;
+use super::finish::{finish, likelier};
 use super::screen::{Candidate, rewrite_at, with_added_starts};
 use super::starts::{set, starts, weakened};
 use crate::evidence::Whitener;
@@ -88,9 +88,7 @@ pub fn assemble<'d>(
 
 /// Goes on with a hypothesis that was fitted for a few iterations only.
 pub fn complete<'d>(setting: &Setting<'d>, mut h: Hypothesis<'d>) -> Hypothesis<'d> {
-    if let Some(base) = setting.further(&h.base, Some(&h.base.whitener), 2, setting.iterations)
-        && base.log_likelihood > h.base.log_likelihood
-    {
+    if let Some(base) = likelier(&h.base, setting.further(&h.base, Some(&h.base.whitener), 2, setting.iterations)) {
         h.base = base;
     }
     finish(setting, &mut h, 0);

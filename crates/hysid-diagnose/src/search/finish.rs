@@ -35,6 +35,6 @@ pub fn without_slight_colour<'d>(setting: &Setting<'d>, base: &Base<'d>) -> Opti
 }
 
 /// Another fit of the same simulation, if it is likelier.
-fn likelier<'d>(base: &Base<'d>, other: Option<Base<'d>>) -> Option<Base<'d>> {
+pub fn likelier<'d>(base: &Base<'d>, other: Option<Base<'d>>) -> Option<Base<'d>> {
     other.filter(|o| o.log_likelihood > base.log_likelihood)
 }

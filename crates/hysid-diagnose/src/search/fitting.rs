@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::finer::finer;
-use super::finish::finish;
+use super::finish::{finish, likelier};
 use super::screen::{Candidate, with_added_starts};
 use super::starts::{is_in_a_loop, set, starting_values, starts, strength_in_shapes};
 use crate::budget::Step;
@@ -88,8 +88,7 @@ fn from_the_first<'d>(
     let Some(sketched) = sketched else {
         return setting.fit(&candidate.refit.simulation, froms.first()?, noise, 1, setting.iterations);
     };
-    let further = setting.further(&sketched, noise, 1, setting.iterations);
-    Some(further.filter(|base| base.log_likelihood > sketched.log_likelihood).unwrap_or(sketched))
+    Some(likelier(&sketched, setting.further(&sketched, noise, 1, setting.iterations)).unwrap_or(sketched))
 }
 
 /// The same from the others of these values, the best of all taken to its end.

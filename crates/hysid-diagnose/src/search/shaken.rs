@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use super::finish::likelier;
 use crate::budget::Step;
 use crate::model::Values;
 use crate::model::base::Base;
@@ -60,8 +61,7 @@ fn lower<'d>(setting: &Setting<'d>, fit: &Base<'d>, seed: u64) -> Option<Base<'d
         if base.log_likelihood < fit.log_likelihood - NEAR {
             return None;
         }
-        let further = setting.further(&base, noise, 1, setting.iterations);
-        Some(further.filter(|f| f.log_likelihood > base.log_likelihood).unwrap_or(base))
+        Some(likelier(&base, setting.further(&base, noise, 1, setting.iterations)).unwrap_or(base))
     };
     let found: Vec<Base<'d>> = beside(fit, seed).into_par_iter().filter_map(from_there).collect();
     let best = found.into_iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
@@ -75,6 +75,7 @@ fn beside(base: &Base<'_>, seed: u64) -> Vec<Values> {
     let seen: Vec<usize> = (0..k).filter(|&i| covariance[i + k * i] > 0.0).collect();
     let m = seen.len();
     let scale: Vec<f64> = seen.iter().map(|&i| covariance[i + k * i].sqrt()).collect();
+    // Unknowns that the recording does not part have a correlation of one to rounding.
     let correlation = DMatrix::from_fn(m, m, |a, b| {
         covariance[seen[a] + k * seen[b]] / (scale[a] * scale[b]) + if a == b { 1e-9 } else { 0.0 }
     });
