@@ -113,7 +113,9 @@ pub(super) fn enter(
         (Target::Output(column), Change::Force(text) | Change::Drive(text)) => {
             let force = writer.text(text)?;
             let output = simulation.output_mut(column).ok_or("the output is gone")?;
-            output.expression = output.expression.clone() + force.clone();
+            let taken = slot.pulls && matches!(change, Change::Force(_));
+            let before = output.expression.clone();
+            output.expression = if taken { before - force.clone() } else { before + force.clone() };
             if let Some(pull) = &slot.feeds_back {
                 let derivative = simulation.state(&pull.state).ok_or("the state is gone")?.derivative.clone();
                 let felt = pull.join(derivative.clone(), pull.of(&force), 1.0);

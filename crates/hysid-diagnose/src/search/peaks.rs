@@ -14,8 +14,8 @@ const NEAR: f64 = 0.25;
 
 /// Frequencies of the largest peaks of the residual's spectrum, in hertz.
 ///
-/// Where the motion repeats itself, its harmonics are left out: a force that returns with every cycle is a law of the motion, and nothing in
-/// such a recording says that it follows the clock.
+/// Where the motion repeats itself, or an input does, its harmonics are left out: a force that returns with every cycle is a law of the motion, and nothing
+/// in such a recording says that it follows the clock.
 pub fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
     let data = base.model.data();
     let Some(series) = data.layout.series.iter().max_by_key(|s| s.rows.len()) else { return Vec::new() };
@@ -24,8 +24,11 @@ pub fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
     let lines = hysid_signal::fourier(x);
     let power: Vec<f64> = lines.iter().map(|(re, im)| re * re + im * im).collect();
     // The frequency of a line's place, in periods within the recording.
-    let cycles = cycle(&data.y[series.rows.clone()]).map(|rows| x.len() as f64 / rows);
-    let of_motion = |at: f64| cycles.is_some_and(|n| (at - n * (at / n).round()).abs() < NEAR);
+    let inputs = data.stretches[series.stretch].drive.inputs();
+    let of_inputs = inputs.iter().filter_map(|u| cycle(&data.rows_of(series, u)));
+    let cycles: Vec<f64> =
+        cycle(&data.y[series.rows.clone()]).into_iter().chain(of_inputs).map(|rows| x.len() as f64 / rows).collect();
+    let of_motion = |at: f64| cycles.iter().any(|n| (at - n * (at / n).round()).abs() < NEAR);
     let mut peaks: Vec<(usize, f64)> = (2..power.len().saturating_sub(1))
         .filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1])
         .map(|k| (k, summit(&power, k)))
@@ -85,7 +88,42 @@ pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
     use super::*;
+    use crate::budget::Budget;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::calibrated;
+    use crate::oscillator::{BASELINE, PERIOD, REAL, normal, respond, rms};
+
+    /// Peaks of what an oscillator under this input leaves of a sensor that runs away, so that the output does not repeat itself, with a line at this
+    /// frequency in hertz.
+    fn peaks(input: impl Fn(f64) -> f64, line: f64) -> Vec<f64> {
+        let mut random = normal(3);
+        let times: Vec<f64> = (0..1200).map(|i| f64::from(i) * PERIOD).collect();
+        let u: Vec<f64> = times.iter().map(|t| input(*t)).collect();
+        let y = respond(&u, REAL, |_, _| 0.0);
+        let size = rms(&y);
+        let run_away = |t: f64| 0.3 * t + 0.2 * (std::f64::consts::TAU * line * t).sin();
+        let y = times.iter().zip(y).map(|(t, y)| y + size * (run_away(*t) + 0.02 * random())).collect();
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        let data = DataSet::new(&Simulation::parse(BASELINE, "test.sim.toml").unwrap(), &[recording], 3).unwrap();
+        assert_eq!(cycle(&data.y), None);
+        let budget = Budget::new(&|_| false);
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        residual_peaks(&calibrated(original, &data, NoiseKind::White(1.0), &budget).1.base)
+    }
+
+    #[test]
+    fn what_returns_with_every_cycle_of_an_input_does_not_follow_the_clock() {
+        let has = |found: &[f64], f: f64| found.iter().any(|p| (p - f).abs() < 0.01);
+        let sine = |t: f64| (std::f64::consts::TAU * 0.8 * t).sin();
+        assert!(!has(&peaks(sine, 2.4), 2.4), "the third harmonic");
+        assert!(has(&peaks(sine, 2.05), 2.05), "a line beside it");
+        assert!(has(&peaks(|t| sine(t * (1.0 + 0.02 * t)), 2.4), 2.4), "an input that does not repeat itself");
+    }
 
     #[test]
     fn the_cycle_of_a_periodic_motion_is_found() {

@@ -19,6 +19,8 @@ use crate::openset::ODDS_AGAINST;
 
 /// Effects and pairs that are fitted for a second look.
 const LOOKED_AT: (usize, usize) = (5, 4);
+/// Sets, the likeliest first, of which one must predict blocks that it was not fitted to before a rehearsal is worth its time.
+const MOST_ASKED: usize = 3;
 /// Share of the residual's power that an effect must take where the residual is mismatch throughout.
 const LARGE: f64 = 0.25;
 /// Log evidence that speaks for a set there, without its share of the power.
@@ -135,9 +137,12 @@ impl<'d> Search<'_, 'd> {
             return None;
         }
         let quick = |h: &&Hypothesis<'_>| h.effects.iter().any(|e| !e.mechanism.family.is_slow_noise());
-        let best = fitted.iter().filter(quick).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let mut better: Vec<&Hypothesis<'d>> =
+            fitted.iter().filter(quick).filter(|h| h.log_evidence > none.log_evidence).collect();
+        better.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        better.truncate(MOST_ASKED);
         // The rehearsal takes far longer than what else is asked.
-        if best.log_evidence <= none.log_evidence || !self.predicts_blocks(none, best) {
+        if !better.into_iter().any(|h| self.predicts_blocks(none, h)) {
             return None;
         }
         (self.hooks.progress)("rehearsing on simulated recordings in which nothing is missing");

@@ -101,6 +101,11 @@ impl Factors {
     }
 }
 
+/// Whether an expression of positive symbols is below zero, term by term.
+pub(super) fn is_negative(expr: &Expr) -> bool {
+    expr.terms().into_iter().all(|(sign, term)| sign * Factors::of(term.clone()).take_number() < 0.0)
+}
+
 /// The product of these factors.
 pub(super) fn product(factors: Vec<Expr>) -> Expr {
     factors.into_iter().reduce(|a, b| a * b).unwrap_or(Expr::Number(1.0))

@@ -2,7 +2,9 @@
 
 use hysid_plant::{Expr, Output, State};
 
-use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, product, quotient, size};
+use super::algebra::{
+    coefficient, has_free_constant, is_negative, linear_coefficient, only_parameters, product, quotient, size,
+};
 use super::balance::is_scaled;
 use super::connections::forces_of;
 use super::find::{Finder, has_unit, presses};
@@ -163,11 +165,6 @@ impl Finder<'_> {
                 if let Some(control) = self.control(&output.expression, &v) {
                     slot.offer(self.simulation, "control", control);
                 }
-                if let Some(v) = velocities.get(i)
-                    && let Some(c) = linear_coefficient(self.simulation, &output.expression, v)
-                {
-                    slot.offer(self.simulation, "c", c);
-                }
                 slots.push(slot);
             }
         }
@@ -216,12 +213,19 @@ impl Finder<'_> {
             Target::Output(output.column.clone()),
         );
         slot.loops = self.loops(&v);
+        let c = linear_coefficient(simulation, &output.expression.replace(&v, &Expr::symbol("?v")), "?v");
+        let k = x.and_then(|x| linear_coefficient(simulation, &output.expression, x));
+        // A damper tells the direction; a spring may be soft.
+        slot.pulls = c.as_ref().or(k.as_ref()).is_some_and(is_negative);
+        let recorded = matches!(v, Expr::Symbol(_));
+        for (symbol, own) in [("c", c.filter(|_| recorded)), ("k", k)] {
+            if let Some(own) = own {
+                slot.offer(simulation, symbol, if slot.pulls { (-own).simplified() } else { own });
+            }
+        }
         slot.offer(simulation, "v", v);
         if let Some(x) = x {
             slot.offer(simulation, "x", Expr::symbol(x));
-            if let Some(k) = linear_coefficient(simulation, &output.expression, x) {
-                slot.offer(simulation, "k", k);
-            }
             if let Some(rad) = simulation.unit_of(x).as_ref().and_then(angle) {
                 slot.offer(simulation, "rad", rad);
             }
@@ -279,6 +283,44 @@ mod tests {
         };
         assert_eq!(places("flow_l_min", "l/min"), [true, false, false]);
         assert_eq!(places("torque_Nm", "N m"), [false, true, true]);
+    }
+
+    #[test]
+    fn what_a_volume_holds_is_no_force() {
+        let places = |unit: &str, column: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.05\n[inputs]\nq = \"pump_L_min\"\nz = \"valve_open\"\n[parameters]\na = {{ value = 1.5, min = 0.1 }}\n[states]\n\
+                 P = {{ derivative = \"q/60 - a*z*P\", initial = 0.0, unit = \"{unit}\" }}\n[outputs]\n{column} = \"P\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "line.sim.toml").unwrap()).slots;
+            [Place::Store, Place::ForceLaw].map(|place| slots.iter().any(|s| s.place == place))
+        };
+        assert_eq!(places("bar", "p_bar"), [true, false]);
+        assert_eq!(places("N", "pull_N"), [false, true]);
+    }
+
+    #[test]
+    fn what_resists_a_pull_is_taken_from_it() {
+        let check = |force: &str, k: &str, friction: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nx = \"stroke_mm\"\np = \"pressure_bar\"\n[parameters]\na = {{ value = 180.0, min = 1.0 }}\n\
+                 k = {{ value = 3.0, min = 0.1 }}\n[outputs]\nforce_N = \"{force}\"\n"
+            );
+            let simulation = Simulation::parse(&text, "muscle.sim.toml").unwrap();
+            let slots = Structure::of(&simulation).slots;
+            let slot = slots.iter().find(|s| s.place == Place::ForceLaw).unwrap();
+            assert_eq!(slot.quantity("k").unwrap().expression.to_string(), k);
+            let law = crate::mechanism::mechanism("coulomb_friction").unwrap();
+            let written = law.rewrite(&simulation, slot, &example_signals(&simulation, slot), Purpose::Refit).unwrap();
+            let own = written.simulation.outputs[0].expression.to_string();
+            assert!(own.starts_with(&format!("{force}{friction}")), "{own}");
+        };
+        check("a*p - k*x", "k", " - F_c*sign");
+        check("a*p + k*x", "k", " + F_c*sign");
+        check("a*p - (k + 2)*x", "k + 2", " - F_c*sign");
+        // A damper tells the direction, a spring may be soft.
+        check("a*d(x) - k*x", "-k", " + F_c*sign");
+        check("a*p + k*x - a*d(x)", "-k", " - F_c*sign");
     }
 
     /// The slots of a core's current, measured in this column as this, and its simulation.

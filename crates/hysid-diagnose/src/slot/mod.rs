@@ -121,6 +121,8 @@ pub struct Slot {
     pub(crate) sensed: Vec<Sensed>,
     /// The state that feels the output which a law here adds to: the flux of a winding its current.
     pub(crate) feeds_back: Option<Pull>,
+    /// Whether the output here is what a part pulls with, which falls as it moves on: a force of a law is taken from it.
+    pub(crate) pulls: bool,
     /// What is looked through for a mechanism that is already there.
     context: Vec<Expr>,
     inputs: usize,
@@ -167,6 +169,7 @@ impl Slot {
             target,
             sensed: Vec::new(),
             feeds_back: None,
+            pulls: false,
             context: Vec::new(),
             inputs: 0,
             idle_loads: Vec::new(),
