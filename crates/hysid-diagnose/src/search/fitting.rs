@@ -250,10 +250,14 @@ impl<'d> UnderWay<'_, 'd> {
     }
 }
 
-/// Leaves those as they are that trail the best by too much.
-fn leave_hopeless(all: &mut [UnderWay<'_, '_>]) {
+/// Leaves those as they are that trail the best by too much; of laws with several shapes, whose first start need not lead to the best of their minima,
+/// only those that explain nothing.
+fn leave_hopeless(all: &mut [UnderWay<'_, '_>], parent: &Hypothesis<'_>) {
     let best = all.iter().filter_map(UnderWay::reached).fold(f64::NEG_INFINITY, f64::max);
-    all.iter_mut().for_each(|one| one.leave_below(best - HOPELESS));
+    for one in all {
+        let bent = one.candidate.refit.shapes.len() >= BENT;
+        one.leave_below((best - HOPELESS).min(if bent { parent.log_evidence } else { f64::INFINITY }));
+    }
 }
 
 /// Refits a short list on top of a hypothesis, in parallel, best evidence first.
@@ -287,17 +291,59 @@ pub fn refit_beside<'d>(
     let last = order.get(MOST_COMPLETE - 1).copied().unwrap_or(f64::NEG_INFINITY);
     let threshold = (best - HOPELESS).min(fourth).max(last).max(least);
     all.par_iter_mut().for_each(|one| one.begin(setting, parent, threshold));
-    leave_hopeless(&mut all);
+    leave_hopeless(&mut all, parent);
     let underway = |one: &&mut UnderWay<'_, 'd>| !one.left;
     all.par_iter_mut().filter(underway).for_each(|one| {
         let begun = one.fit.take().map(|h| h.base);
         one.fit = from_the_others(setting, parent, one.candidate, &one.froms, begun);
     });
-    leave_hopeless(&mut all);
+    leave_hopeless(&mut all, parent);
     all.par_iter_mut().filter(underway).for_each(|one| {
         one.fit = one.fit.take().map(|h| in_another_form(setting, parent, h));
     });
     let mut out: Vec<Hypothesis<'d>> = all.into_iter().filter_map(|one| one.fit).collect();
     out.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+    use hysid_signal::{Channel, Clock, Recording};
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::data::DataSet;
+    use crate::model::base::NoiseKind;
+    use crate::model::hypothesis::calibrated;
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
+
+    #[test]
+    fn a_law_with_several_shapes_is_left_only_where_it_explains_nothing() {
+        let u = drive(300, &mut normal(1));
+        let y = respond(&u, REAL, |_, _| 0.0);
+        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
+        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
+        let original = || Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let data = DataSet::new(&original(), &[recording], 3).unwrap();
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original(), &data, NoiseKind::White(1.0), &budget);
+        let candidates = setting.lacking(&none, &none.base.evidence());
+        let with = |bent: bool| candidates.iter().find(|c| (c.refit.shapes.len() >= BENT) == bent).unwrap();
+        let one = |bent: bool, gain: f64| {
+            let base = setting.further(&none.base, None, 1, 1).unwrap();
+            let fit = Hypothesis { log_evidence: none.log_evidence + gain, ..setting.hypothesis(Vec::new(), base) };
+            UnderWay { candidate: with(bent), froms: Vec::new(), fit: Some(fit), left: false }
+        };
+        let mut all = [
+            one(false, 900.0),
+            one(false, 870.0),
+            one(false, 800.0),
+            one(true, 800.0),
+            one(true, 1.0),
+            one(true, -1.0),
+        ];
+        leave_hopeless(&mut all, &none);
+        assert_eq!(all.map(|one| one.left), [false, false, true, false, false, true]);
+    }
 }

@@ -156,14 +156,12 @@ impl Finder<'_> {
                 slot.offer(self.simulation, "i", Expr::symbol(current));
                 slot.offer(self.simulation, "v", Expr::symbol(motion.v));
             }
-            let into = self.simulation.states.iter().filter(|s| s.derivative.uses(symbol));
-            let forced = |s: &State| has_free_constant(self.simulation, force_of(self.simulation, &s.derivative).0);
-            slot.constant = into.into_iter().any(forced)
-                || self
-                    .simulation
-                    .outputs
-                    .iter()
-                    .any(|o| o.expression.uses(symbol) && has_free_constant(self.simulation, &o.expression));
+            // A constant that is free takes up an offset where it stands beside the input wherever that enters.
+            let states =
+                self.simulation.states.iter().map(|s| (&s.derivative, force_of(self.simulation, &s.derivative).0));
+            let outputs = self.simulation.outputs.iter().map(|o| (&o.expression, &o.expression));
+            let mut entered = states.chain(outputs).filter(|(whole, _)| whole.uses(symbol)).peekable();
+            slot.constant = entered.peek().is_some() && entered.all(|(_, sum)| has_free_constant(self.simulation, sum));
             slots.push(slot);
         }
         slots
@@ -209,9 +207,9 @@ impl Finder<'_> {
         driven.find_map(|s| Some((s.name.as_str(), moved(s)?)))
     }
 
-    /// Whether a state may be a current: one that does not move, in amperes where its unit is known.
+    /// Whether a state may be a current, or the flux linkage that tells it: one that does not move, in amperes or webers where its unit is known.
     pub(super) fn is_current(&self, state: &State) -> bool {
-        !self.moves(&state.name) && self.simulation.unit_of(&state.name).is_none_or(|u| is_one_of(&u, &["A"]))
+        !self.moves(&state.name) && self.simulation.unit_of(&state.name).is_none_or(|u| is_one_of(&u, &["A", "Wb"]))
     }
 
     /// A measured quantity has the unit that its column's name ends in.

@@ -49,3 +49,26 @@ pub static BACK_EMF: Mechanism = Mechanism {
     signature: "An input that weakens with the speed and lags.",
     reference: "W. Leonhard, Control of Electrical Drives, 3rd ed., Springer (2001)",
 };
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::slot::Structure;
+
+    #[test]
+    fn a_winding_has_a_current_or_the_flux_linkage_that_tells_it() {
+        let wound = |unit: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 1e-3\n[inputs]\ne = \"coil_V\"\n[parameters]\nR = {{ value = 4.0, min = 1.0 }}\nK = {{ value = 11.0, min = 2.0 }}\n\
+                 [states]\ns = {{ derivative = \"e - R*s\", initial = 0.0, unit = \"{unit}\" }}\nx = {{ derivative = \"v\", initial = 0.0, unit = \"m\" }}\n\
+                 v = {{ derivative = \"K*s - 9*v - 500*x\", initial = 0.0, unit = \"m/s\" }}\n[outputs]\npos_m = \"x\"\n"
+            );
+            let structure = Structure::of(&Simulation::parse(&text, "solenoid.sim.toml").unwrap());
+            BACK_EMF.slots(&structure).iter().any(|s| s.label == "input:e" && s.has("i"))
+        };
+        assert!(wound("A") && wound("V s") && wound("Wb"));
+        assert!(!wound("K"));
+    }
+}
