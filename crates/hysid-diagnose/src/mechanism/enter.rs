@@ -118,7 +118,7 @@ pub(super) fn enter(
             output.expression = if taken { before - force.clone() } else { before + force.clone() };
             if let Some(pull) = &slot.feeds_back {
                 let derivative = simulation.state(&pull.state).ok_or("the state is gone")?.derivative.clone();
-                let felt = pull.join(derivative.clone(), pull.of(&force), 1.0);
+                let felt = pull.join(derivative.clone(), pull.of(&force), if taken { -1.0 } else { 1.0 });
                 derive(simulation, slot, &pull.state, &derivative, felt);
             }
             Ok(())
