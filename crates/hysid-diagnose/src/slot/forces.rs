@@ -358,16 +358,11 @@ mod tests {
         assert!(held(&added.derivative), "{} beside {own}", added.derivative);
         // Measured the other way round the law is taken from the current, and the flux feels it the same.
         let (simulation, slots) = core("Wb", "primary_A", "-lam/L");
-        let rewritten = |text: &str| {
-            let drive = crate::mechanism::mechanism("coulomb_friction").unwrap();
-            let written = drive
-                .rewrite(&simulation, &slots[0], &example_signals(&simulation, &slots[0]), Purpose::Refit)
-                .unwrap();
-            let [own, felt] = [&written.simulation.outputs[0].expression, &written.simulation.states[0].derivative]
-                .map(Expr::to_string);
-            assert!(own.contains(" - F_c*") && felt.contains(text), "{own}; {felt}");
-        };
-        rewritten(" - R*");
+        let friction = crate::mechanism::mechanism("coulomb_friction").unwrap();
+        let signals = example_signals(&simulation, &slots[0]);
+        let written = friction.rewrite(&simulation, &slots[0], &signals, Purpose::Refit).unwrap().simulation;
+        let (own, felt) = (written.outputs[0].expression.to_string(), written.states[0].derivative.to_string());
+        assert!(own.contains(" - F_c*") && felt.contains(" - R*(F_c*"), "{own}; {felt}");
         let (simulation, slots) = core("Wb", "primary_A", "lam/L");
         // The law stands at the measured current and at no other place of the circuit.
         assert!(!Structure::of(&simulation).slots.iter().any(|s| s.place == Place::Circuit));
