@@ -254,9 +254,10 @@ impl<'d> UnderWay<'_, 'd> {
 /// only those that explain nothing.
 fn leave_hopeless(all: &mut [UnderWay<'_, '_>], parent: &Hypothesis<'_>) {
     let best = all.iter().filter_map(UnderWay::reached).fold(f64::NEG_INFINITY, f64::max);
+    let near = best - HOPELESS;
     for one in all {
         let bent = one.candidate.refit.shapes.len() >= BENT;
-        one.leave_below((best - HOPELESS).min(if bent { parent.log_evidence } else { f64::INFINITY }));
+        one.leave_below(if bent { near.min(parent.log_evidence) } else { near });
     }
 }
 
@@ -309,25 +310,21 @@ pub fn refit_beside<'d>(
 #[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
-    use hysid_signal::{Channel, Clock, Recording};
 
     use super::*;
     use crate::budget::Budget;
-    use crate::data::DataSet;
     use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::calibrated;
+    use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
 
     #[test]
     fn a_law_with_several_shapes_is_left_only_where_it_explains_nothing() {
         let u = drive(300, &mut normal(1));
         let y = respond(&u, REAL, |_, _| 0.0);
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
-        let original = || Simulation::parse(BASELINE, "test.sim.toml").unwrap();
-        let data = DataSet::new(&original(), &[recording], 3).unwrap();
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
-        let (setting, none) = calibrated(original(), &data, NoiseKind::White(1.0), &budget);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let candidates = setting.lacking(&none, &none.base.evidence());
         let with = |bent: bool| candidates.iter().find(|c| (c.refit.shapes.len() >= BENT) == bent).unwrap();
         let one = |bent: bool, gain: f64| {

@@ -344,12 +344,10 @@ fn fitted_key(h: &Hypothesis<'_>) -> Key {
 #[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
-    use hysid_signal::{Channel, Clock, Recording};
 
     use super::*;
     use crate::budget::Budget;
-    use crate::data::DataSet;
-    use crate::model::hypothesis::calibrated;
+    use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
 
     /// What may have been absorbed, and the largest score of the same under the noise model's own eyes, where this is added to an oscillator's
@@ -360,10 +358,8 @@ mod tests {
         let mut y = respond(&u, REAL, |_, _| 0.0);
         let noise = 0.005 * rms(&y);
         y.iter_mut().enumerate().for_each(|(i, y)| *y += noise * (added(i as f64 * PERIOD) + random()));
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
-        let data = DataSet::new(&original, &[recording], 3).unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
         let search = Search::new(setting, Options::default(), &Hooks::SILENT);

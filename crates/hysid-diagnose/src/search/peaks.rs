@@ -89,12 +89,11 @@ pub fn lines_of(data: &DataSet, effect: &Rewritten) -> f64 {
 #[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
-    use hysid_signal::{Channel, Clock, Recording};
 
     use super::*;
     use crate::budget::Budget;
     use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::calibrated;
+    use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, normal, respond, rms};
 
     /// Peaks of what an oscillator under this input leaves of a sensor that runs away, so that the output does not repeat itself, with a line at this
@@ -107,12 +106,10 @@ mod tests {
         let size = rms(&y);
         let run_away = |t: f64| 0.3 * t + 0.2 * (std::f64::consts::TAU * line * t).sin();
         let y = times.iter().zip(y).map(|(t, y)| y + size * (run_away(*t) + 0.02 * random())).collect();
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
-        let data = DataSet::new(&Simulation::parse(BASELINE, "test.sim.toml").unwrap(), &[recording], 3).unwrap();
+        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
+        let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         assert_eq!(cycle(&data.y), None);
         let budget = Budget::new(&|_| false);
-        let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         residual_peaks(&calibrated(original, &data, NoiseKind::White(1.0), &budget).1.base)
     }
 

@@ -179,13 +179,12 @@ pub fn by_rehearsal(
 #[cfg(test)]
 mod tests {
     use hysid_plant::Simulation;
-    use hysid_signal::{Channel, Clock, Recording};
     use proptest::prelude::*;
 
     use super::*;
     use crate::budget::Budget;
     use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::calibrated;
+    use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::search::screen::screen;
 
@@ -213,7 +212,7 @@ mod tests {
     }
 
     /// An oscillator with a cubic spring of this stiffness, in N/m^3, under autoregressive noise.
-    fn recorded(seed: u64, cubic: f64) -> DataSet {
+    fn stiffened(seed: u64, cubic: f64) -> DataSet {
         let mut random = normal(seed);
         let u = drive(800, &mut random);
         let mut y = respond(&u, REAL, |x, _| cubic * x * x * x);
@@ -223,9 +222,7 @@ mod tests {
             noise = 0.8 * noise + 0.6 * size * random();
             *y += noise;
         }
-        let channels = vec![Channel { name: "u_N".into(), samples: u }, Channel { name: "x_m".into(), samples: y }];
-        let recording = Recording::new("est.csv", Clock { start_s: 0.0, period_s: PERIOD }, channels).unwrap();
-        DataSet::new(&Simulation::parse(BASELINE, "test.sim.toml").unwrap(), &[recording], 3).unwrap()
+        recorded(&Simulation::parse(BASELINE, "test.sim.toml").unwrap(), PERIOD, [("u_N", u), ("x_m", y)])
     }
 
     fn p_value(data: &DataSet) -> Option<f64> {
@@ -240,10 +237,10 @@ mod tests {
     #[test]
     fn a_cubic_spring_under_coloured_noise_is_seen_and_its_absence_is_no_alarm() {
         for seed in 1..4 {
-            let p = p_value(&recorded(seed, 0.0));
+            let p = p_value(&stiffened(seed, 0.0));
             assert!(p.is_none_or(|p| p > 0.005), "seed {seed}: {p:?} where nothing is missing");
         }
-        let p = p_value(&recorded(4, CUBIC)).unwrap();
+        let p = p_value(&stiffened(4, CUBIC)).unwrap();
         assert!(p < 0.005, "{p}");
     }
 

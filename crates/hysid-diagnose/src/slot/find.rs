@@ -95,13 +95,13 @@ impl Finder<'_> {
     /// Whether the outputs are forces over the motion that the inputs prescribe.
     pub(super) fn is_force_law(&self) -> bool {
         let prescribed = self.simulation.inputs.iter().any(|i| self.kinematic_input(&i.symbol) != Kinematic::Neither);
-        // A motion, and what flows or is warm (behind a pump, of which the speed is prescribed), is no force. Nor is a pressure that has an equation of its own: a
-        // volume holds it.
-        let held: &[&str] = if self.simulation.states.is_empty() { &[] } else { &["Pa"] };
+        // A motion, and what flows or is warm (behind a pump, of which the speed is prescribed), is no force. Nor is a pressure in a
+        // simulation with states: a volume holds it.
         let is_none = |column: &str, e: &Expr| {
             self.unit_of_output(column, e).is_some_and(|u| {
-                let stored = is_one_of(&u, &["m3", "m3/s", "kg/s", "K"]) || is_one_of(&u, held);
-                kinematic(Some(&u), "") != Kinematic::Neither || stored
+                kinematic(Some(&u), "") != Kinematic::Neither
+                    || is_one_of(&u, &["m3", "m3/s", "kg/s", "K"])
+                    || (!self.simulation.is_static() && is_one_of(&u, &["Pa"]))
             })
         };
         self.motions.is_empty()

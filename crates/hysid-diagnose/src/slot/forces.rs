@@ -356,6 +356,8 @@ mod tests {
             found
         };
         assert!(held(&added.derivative), "{} beside {own}", added.derivative);
+        // The law stands at the measured current and at no other place of the circuit.
+        assert!(!Structure::of(&simulation).slots.iter().any(|s| s.place == Place::Circuit));
         // Measured the other way round the law is taken from the current, and the flux feels it the same.
         let (simulation, slots) = core("Wb", "primary_A", "-lam/L");
         let friction = crate::mechanism::mechanism("coulomb_friction").unwrap();
@@ -363,9 +365,6 @@ mod tests {
         let written = friction.rewrite(&simulation, &slots[0], &signals, Purpose::Refit).unwrap().simulation;
         let (own, felt) = (written.outputs[0].expression.to_string(), written.states[0].derivative.to_string());
         assert!(own.contains(" - F_c*") && felt.contains(" - R*(F_c*"), "{own}; {felt}");
-        let (simulation, slots) = core("Wb", "primary_A", "lam/L");
-        // The law stands at the measured current and at no other place of the circuit.
-        assert!(!Structure::of(&simulation).slots.iter().any(|s| s.place == Place::Circuit));
     }
 
     #[test]
