@@ -21,7 +21,7 @@ use crate::model::base::NoiseKind;
 use crate::model::force::pushed;
 use crate::model::hold::free_run;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
-use crate::openset::shapes::told_limit;
+use crate::openset::shapes::told_rate;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
 use crate::search::profile::{centre_moments, take_intervals};
@@ -148,8 +148,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.notes.extend(lacking.into_iter().flatten());
     file.notes.extend(one_sided(best));
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
-    let limit = file.correction.as_ref().and_then(|c| told_limit(&c.loudest()?.term));
-    let varying = limit.or(varying).or(wanders);
+    let rate = file.correction.as_ref().and_then(|c| told_rate(&c.loudest()?.term));
+    let varying = rate.or(varying).or(wanders);
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
     if runs_away {
         file.summary = "The simulation runs away by itself: no free run of it can follow the recording, and nothing can be said of what it lacks.".into();

@@ -224,8 +224,16 @@ pub fn limits((a, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
     places.map(one).collect()
 }
 
-/// The limit of a rate that a term of [`limits`] tells, in words.
-pub fn told_limit(term: &str) -> Option<String> {
+/// A rate by its size: what rises faster than it falls, or the other way round, as the needle of a level meter or the charge behind a diode.
+pub fn one_way_faster((a, x): (&str, &[Vec<f64>])) -> Shape {
+    Shape::new(format!("abs({a})"), Kind::Even, each(x, f64::abs))
+}
+
+/// What a term of [`limits`] or [`one_way_faster`] tells of a rate, in words.
+pub fn told_rate(term: &str) -> Option<String> {
+    if let Some(state) = term.strip_prefix("abs(rate_").and_then(|rest| rest.strip_suffix(')')) {
+        return Some(format!("`{state}` rises at another rate than it falls"));
+    }
     let (state, rest) = term.strip_prefix("max(rate_")?.split_once(" - ")?;
     let (limit, _) = rest.split_once(',')?;
     Some(format!("the rate of `{state}` is limited, at about {limit} of its unit per second"))
@@ -262,6 +270,22 @@ pub fn linked(
     let Shape { text, series, .. } = product(place, place);
     out.push(Shape::new(format!("{text}*{}", acceleration.0), Kind::Odd, both(&series, acceleration.1, |a, b| a * b)));
     out
+}
+
+/// What comes round with the turns of another part, of this speed and angle in rad: the centrifugal force of its unbalance, and a force that is the same
+/// at any speed. Nothing where it does not turn around.
+pub fn unbalanced((w, speed): Named<'_>, (a, angle): Named<'_>) -> Vec<Shape> {
+    if spread(angle) < TAU {
+        return Vec::new();
+    }
+    let waves = [("sin", f64::sin as fn(f64) -> f64), ("cos", f64::cos)];
+    let of_wave = |(wave, f): (&str, fn(f64) -> f64)| {
+        [
+            Shape::new(format!("{w}^2*{wave}({a})"), Kind::Even, both(speed, angle, |w, a| w * w * f(a))),
+            Shape::new(format!("{wave}({a})"), Kind::Even, each(angle, f)),
+        ]
+    };
+    waves.into_iter().flat_map(of_wave).collect()
 }
 
 /// A factor of a product: how it is written, whether it is odd, and its values.
@@ -345,8 +369,10 @@ mod tests {
         let rate = vec![(0..100).map(f64::from).collect::<Vec<_>>()];
         let texts: Vec<String> = limits(("rate_fin", &rate)).into_iter().map(|s| s.text).collect();
         assert_eq!(texts[1], "max(rate_fin - 74.2, 0) - max(-74.2 - rate_fin, 0)");
-        assert!(told_limit(&texts[1]).unwrap().contains("`fin` is limited, at about 74.2"));
-        assert_eq!(told_limit("fin^2"), None);
+        assert!(told_rate(&texts[1]).unwrap().contains("`fin` is limited, at about 74.2"));
+        let faster = told_rate(&one_way_faster(("rate_fin", &rate)).text);
+        assert_eq!(faster.as_deref(), Some("`fin` rises at another rate than it falls"));
+        assert_eq!(told_rate("fin^2"), None);
     }
 
     #[test]

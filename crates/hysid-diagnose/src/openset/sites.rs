@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use hysid_plant::{Expr, Simulation, Slot as Place};
+use hysid_plant::{Expr, Simulation, Slot as Place, State};
 
-use crate::slot::{Place as Slotted, Structure, is_turn};
+use crate::slot::{Place as Slotted, Structure, angle, is_turn};
 
 /// A signal that terms are written over.
 #[derive(Debug, Clone)]
@@ -46,23 +46,33 @@ pub struct Site {
     pub parts: Vec<(usize, usize)>,
     /// The acceleration here, where there are such parts: on linkages the inertia depends on how the others stand.
     pub acceleration: Option<Symbol>,
+    /// What turns elsewhere, where something moves here: its speed and its angle in rad.
+    pub turning: Vec<[Symbol; 2]>,
 }
 
 impl Site {
     /// A site at which nothing else is looked at than what is there.
     fn alone(place: Place, slot: String, side: &'static str, own: Vec<Symbol>) -> Self {
-        Self { place, slot, side, own, rate: None, others: Vec::new(), parts: Vec::new(), acceleration: None }
+        let (others, parts, turning) = (Vec::new(), Vec::new(), Vec::new());
+        Self { place, slot, side, own, rate: None, others, parts, acceleration: None, turning }
     }
 
     /// All that terms are written over, in this order.
     pub fn symbols(&self) -> impl Iterator<Item = &Symbol> {
-        self.own.iter().chain(&self.rate).chain(&self.others).chain(&self.acceleration)
+        let turning = self.turning.iter().flatten();
+        self.own.iter().chain(&self.rate).chain(&self.others).chain(&self.acceleration).chain(turning)
     }
 
     /// What [`Self::others`] are among [`Self::symbols`].
     pub fn elsewhere(&self) -> Range<usize> {
         let start = self.own.len() + usize::from(self.rate.is_some());
         start..start + self.others.len()
+    }
+
+    /// What each pair of [`Self::turning`] is among [`Self::symbols`].
+    pub fn turns(&self) -> impl Iterator<Item = [usize; 2]> {
+        let start = self.elsewhere().end + usize::from(self.acceleration.is_some());
+        (0..self.turning.len()).map(move |i| [start + 2 * i, start + 2 * i + 1])
     }
 }
 
@@ -104,6 +114,8 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
         if motion.is_empty() { vec![Symbol::itself(&state.name)] } else { motion }
     });
     let others = own.as_ref().map_or(Vec::new(), |own| others(simulation, own));
+    let moved = own.as_ref().filter(|own| own.iter().any(|s| s.velocity));
+    let turning = moved.map_or(Vec::new(), |own| turning(simulation, own));
     let own = own.unwrap_or_default();
     let moves_by_itself = own.iter().all(|s| s.name == state.name) && !matches!(state.derivative, Expr::Symbol(_));
     let rate = moves_by_itself.then(|| Symbol::new(&format!("rate_{}", state.name), state.derivative.clone()));
@@ -115,7 +127,25 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
     let parts: Vec<(usize, usize)> = (0..others.len()).filter_map(|x| Some((x, velocity(&others[x])?))).collect();
     let moves = own.iter().any(|s| s.velocity) && !parts.is_empty();
     let acceleration = moves.then(|| Symbol::new(&format!("acc_{}", state.name), state.derivative.clone()));
-    Site { rate, others, parts, acceleration, ..Site::alone(Place::State(i), label, "plant", own) }
+    Site { rate, others, parts, acceleration, turning, ..Site::alone(Place::State(i), label, "plant", own) }
+}
+
+/// The speeds and angles of what turns without a part in a slot's own coordinates, as a rotor in a machine that stands on springs.
+fn turning(simulation: &Simulation, own: &[Symbol]) -> Vec<[Symbol; 2]> {
+    let elsewhere = |name: &str| own.iter().all(|s| !s.meaning.uses(name));
+    let of_state = |state: &State| {
+        let rad = angle(&simulation.unit_of(&state.name)?)?;
+        let turned = Symbol::new(&format!("{}_rad", state.name), (rad * Expr::symbol(&state.name)).simplified());
+        let rates = state.derivative.symbols();
+        let mut speeds = rates.iter().filter(|s| simulation.state(s).is_some());
+        match (speeds.next(), speeds.next()) {
+            (Some(speed), None) if elsewhere(speed) && elsewhere(&state.name) => {
+                Some([Symbol::itself(speed), turned])
+            }
+            _ => None,
+        }
+    };
+    simulation.states.iter().filter_map(of_state).collect()
 }
 
 /// The states that none of a slot's own coordinates is made of: what moves elsewhere acts through products (a swing's centrifugal force, a field's
@@ -124,4 +154,34 @@ fn others(simulation: &Simulation, own: &[Symbol]) -> Vec<Symbol> {
     let known: Vec<String> = own.iter().flat_map(|s| s.meaning.symbols()).collect();
     let states = simulation.states.iter().map(|s| s.name.as_str()).filter(|name| !is_turn(simulation, name));
     states.filter(|name| known.iter().all(|k| k != name)).take(OTHERS).map(Symbol::itself).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::slot::with_turns;
+
+    /// The name of the speed and the meaning of the angle of each pair that turns elsewhere, at a slot of a table under a rotor whose states are these.
+    fn turning_at(slot: &str, rotor: &str) -> Vec<String> {
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\nu = \"ref_rpm\"\n[parameters]\nT = {{ value = 1.0, min = 0.1 }}\nk = {{ value = 90.0, min = 9.0 }}\n[states]\n{rotor}\
+             x = {{ derivative = \"v\", initial = 0.0, unit = \"mm\" }}\nv = {{ derivative = \"-k*x - T*v\", initial = 0.0, unit = \"mm/s\" }}\n\
+             [outputs]\nx_mm = \"x\"\nspeed_rpm = \"n\"\n"
+        );
+        let simulation = with_turns(&Simulation::parse(&text, "table.sim.toml").unwrap());
+        let sites = sites(&simulation, &Structure::of(&simulation));
+        let site = sites.iter().find(|s| s.slot == slot).unwrap();
+        let told = |i: usize| site.symbols().nth(i).unwrap().meaning.to_string();
+        site.turns().map(|[speed, angle]| format!("{}: {}", told(speed), told(angle))).collect()
+    }
+
+    #[test]
+    fn what_turns_elsewhere_shakes_what_moves() {
+        let speed = "n = { derivative = \"(u - n)/T\", initial = 0.0, unit = \"rpm\" }\n";
+        assert_eq!(turning_at("state:v", speed), ["n: turn"]);
+        // Not where it is at home: the catalogue has that.
+        assert!(turning_at("state:n", speed).is_empty());
+        let angle = "q = { derivative = \"n*6\", initial = 0.0, unit = \"deg\" }\n";
+        assert_eq!(turning_at("state:v", &format!("{speed}{angle}")), ["n: pi/180*q"]);
+    }
 }

@@ -91,9 +91,13 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
         let own_and_others = symbols.iter().zip(&series).map(|(s, x)| Coordinate::new(&s.name, s.meaning.clone(), x));
         let driving = inputs.iter().map(|(u, x)| Coordinate::new(u, Expr::symbol(*u), x));
         let within: Arc<[Coordinate]> = own_and_others.chain(driving).collect();
+        let turns = site.turns();
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (symbols[i].name.as_str(), series[i].as_slice());
-        found.extend((own..others.start).flat_map(|rate| shapes::limits(named(rate))));
+        for rate in own..others.start {
+            found.extend(shapes::limits(named(rate)));
+            found.push(shapes::one_way_faster(named(rate)));
+        }
         for other in others.clone() {
             found.push(shapes::proportional(named(other)));
             let factors = (0..own).chain(others.start..=other);
@@ -107,6 +111,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
                 found.extend(shapes::linked((x, named(v)), other, named(others.end)));
             }
         }
+        found.extend(turns.flat_map(|[speed, angle]| shapes::unbalanced(named(speed), named(angle))));
         if plant && let (Some(first), Some(x)) = (site.own.first(), series.first()) {
             found.extend(past::echoes(&first.name, x, data));
         }

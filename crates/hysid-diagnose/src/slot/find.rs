@@ -1,6 +1,6 @@
 //! The slots of a simulation, found from its equations.
 
-use hysid_plant::{Expr, Memory, Simulation, State, Unit};
+use hysid_plant::{Expr, Memory, Output, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient};
 use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
@@ -88,8 +88,19 @@ impl Finder<'_> {
         Unit::of_column(column).or_else(|| self.simulation.unit_of_expr(expression))
     }
 
+    /// What an input is as a motion. Where pressures over a flow are all that is simulated, the flow is the velocity of what is pressed through.
     pub(super) fn kinematic_input(&self, symbol: &str) -> Kinematic {
-        kinematic(self.simulation.unit_of(symbol).as_ref(), symbol)
+        let unit = self.simulation.unit_of(symbol);
+        match kinematic(unit.as_ref(), symbol) {
+            Kinematic::Neither if self.is_pressure_law() && has_unit(unit.clone(), &["m3/s"]) => Kinematic::Velocity,
+            Kinematic::Neither if self.is_pressure_law() && has_unit(unit, &["m3"]) => Kinematic::Displacement,
+            kind => kind,
+        }
+    }
+
+    fn is_pressure_law(&self) -> bool {
+        let pressed = |o: &Output| has_unit(self.unit_of_output(&o.column, &o.expression), &["Pa"]);
+        self.simulation.is_static() && self.simulation.outputs.iter().all(pressed)
     }
 
     /// Whether the outputs are forces over the motion that the inputs prescribe.

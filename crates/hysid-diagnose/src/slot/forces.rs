@@ -300,6 +300,20 @@ mod tests {
     }
 
     #[test]
+    fn what_presses_a_flow_through_resists_it_as_a_damper_a_velocity() {
+        let law = |column: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.05\n[inputs]\nq = \"flow_L_min\"\n[parameters]\na = {{ value = 1.5, min = 0.1 }}\n[outputs]\n{column} = \"-a*q\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "filter.sim.toml").unwrap()).slots;
+            let law = slots.into_iter().find(|s| s.place == Place::ForceLaw);
+            law.and_then(|s| Some(s.quantity("v")?.expression.to_string()))
+        };
+        assert_eq!(law("drop_mbar").as_deref(), Some("q"));
+        assert_eq!(law("through_L_min"), None);
+    }
+
+    #[test]
     fn what_resists_a_pull_is_taken_from_it() {
         let check = |force: &str, k: &str, friction: &str| {
             let text = format!(

@@ -56,6 +56,11 @@ pub(crate) fn with_used_turns(document: &Simulation, user: &Simulation) -> Simul
     out
 }
 
+/// Whether a state is such an angle that something uses.
+pub(crate) fn begins_anywhere(state: &State) -> bool {
+    state.name.starts_with(TURN) && state.initial == Initial::Free
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -21,13 +21,12 @@ impl Compiled {
     /// The smallest number of steps in each period (1, 2, 3, 4, 6, 8, 12, ..., 64) whose response changes by less than
     /// `tolerance` on twice as many, or the most accurate one that was tried.
     ///
-    /// Judged on at most 2000 samples of the drive.
+    /// Judged on the whole drive: a sweep asks for little before it is fast.
     pub fn check_steps(&self, drive: &Drive, theta: &[f64], start: Start<'_>, tolerance: f64) -> StepCheck {
         if self.simulation.states.is_empty() {
             return StepCheck { substeps: 1, error: 0.0 };
         }
-        let short = drive.shortened(2000);
-        let outputs = |substeps| self.simulate(&Run::new(&short, theta).from(start).with_substeps(substeps));
+        let outputs = |substeps| self.simulate(&Run::new(drive, theta).from(start).with_substeps(substeps));
         let mut best = StepCheck { substeps: MOST_STEPS, error: f64::NAN };
         let mut known: Vec<(usize, super::Response)> = Vec::new();
         for substeps in [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64] {

@@ -1,7 +1,7 @@
 //! Trajectories against closed forms; the observer and the check of the step.
 
 use crate::common::equations::{drive, largest_error, model, simulate, wobble};
-use hysid_plant::{Data, Observer, Run, Start};
+use hysid_plant::{Data, Drive, Observer, Run, Start};
 
 #[test]
 fn a_free_oscillator_follows_its_closed_form() {
@@ -250,12 +250,16 @@ fn an_observer_leads_from_the_free_run_to_the_measurement() {
 #[test]
 fn the_step_halving_check_asks_for_what_the_equations_need() {
     let states = [("x", "v", "0.1"), ("v", "u - k*x", "0.0")];
-    let steps = |k: f64| {
+    let steps = |k: f64, drive: &Drive| {
         let compiled = model("linear", &[("k", k)], &states, &[("y", "x")]);
         let theta = compiled.theta();
-        compiled.check_steps(&drive(400, wobble), &theta, Start::Document(&[]), 1e-4)
+        compiled.check_steps(drive, &theta, Start::Document(&[]), 1e-4)
     };
-    let (slow, fast) = (steps(100.0), steps(40_000.0));
+    let (slow, fast) = (steps(100.0, &drive(400, wobble)), steps(40_000.0, &drive(400, wobble)));
     assert!(slow.substeps == 1 && slow.error < 1e-4, "{slow:?}");
     assert!(fast.substeps > 4 && fast.error < 1e-4, "{fast:?}");
+    // A sweep that comes to the resonance (30 rad/s, at 37.5 s) at its end.
+    let sweep = |t: f64| 1e4 * (0.4 * t * t).sin();
+    let (early, whole) = (steps(900.0, &drive(2000, sweep)), steps(900.0, &drive(4000, sweep)));
+    assert!(early.substeps < whole.substeps, "{early:?} {whole:?}");
 }
