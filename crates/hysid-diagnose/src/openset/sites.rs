@@ -139,9 +139,7 @@ fn turning(simulation: &Simulation, own: &[Symbol]) -> Vec<[Symbol; 2]> {
         let rates = state.derivative.symbols();
         let mut speeds = rates.iter().filter(|s| simulation.state(s).is_some());
         match (speeds.next(), speeds.next()) {
-            (Some(speed), None) if elsewhere(speed) && elsewhere(&state.name) => {
-                Some([Symbol::itself(speed), turned])
-            }
+            (Some(speed), None) if elsewhere(speed) && elsewhere(&state.name) => Some([Symbol::itself(speed), turned]),
             _ => None,
         }
     };

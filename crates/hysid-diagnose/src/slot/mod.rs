@@ -21,6 +21,7 @@ mod find;
 mod forces;
 mod grounds;
 mod heat;
+mod laws;
 mod loops;
 mod motion;
 mod pattern;
