@@ -90,7 +90,14 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             inputs.iter().map(|u| u.symbol.as_str()).zip(series.split_off(symbols.len())).collect();
         let own_and_others = symbols.iter().zip(&series).map(|(s, x)| Coordinate::new(&s.name, s.meaning.clone(), x));
         let driving = inputs.iter().map(|(u, x)| Coordinate::new(u, Expr::symbol(*u), x));
-        let within: Arc<[Coordinate]> = own_and_others.chain(driving).collect();
+        let mut within: Vec<Coordinate> = Vec::new();
+        for coordinate in own_and_others.chain(driving) {
+            // The speed of what turns elsewhere is one of the others too.
+            if !within.iter().any(|known| known.name == coordinate.name) {
+                within.push(coordinate);
+            }
+        }
+        let within: Arc<[Coordinate]> = within.into();
         let turns = site.turns();
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (symbols[i].name.as_str(), series[i].as_slice());
