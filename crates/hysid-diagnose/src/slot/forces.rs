@@ -149,8 +149,6 @@ mod tests {
     use super::super::Structure;
     use super::super::connections::tests::slots;
     use super::*;
-    use crate::mechanism::Purpose;
-    use crate::mechanism::conformance::example_signals;
 
     #[test]
     fn a_displacement_may_be_a_multiple_of_what_its_velocity_sums_up_to() {
