@@ -35,9 +35,9 @@ fn steps_needed(model: &Model<'_>) -> usize {
     (0..model.data.stretches.len()).map(needed).max().unwrap_or(1)
 }
 
-/// Shares of a recording on which an angle at which something begins to turn may be estimated: more of it where the least tells nothing of it, as of a
-/// rotor that stands still at first.
-const HEADS: [f64; 4] = [HEAD, 0.1, 0.2, 0.4];
+/// Shares of a recording on which an angle at which something begins to turn may be estimated where [`HEAD`] does not tell it, as of a rotor that stands
+/// still at first.
+const FURTHER: [f64; 3] = [0.1, 0.2, 0.4];
 /// Standard error of such an angle from which it is told, in rad.
 const TOLD: f64 = 0.1;
 
@@ -74,15 +74,14 @@ pub fn free_run(document: &Simulation, data: &DataSet, substeps: usize) -> Optio
     let mut fixed = document.clone();
     fixed.parameters.iter_mut().for_each(|p| p.fixed = true);
     let substeps = steps_needed(&Model::new(&fixed, data, substeps).ok()?).max(substeps);
-    let mut found = None;
-    for share in HEADS {
-        let (values, told) = estimated(&fixed, data, share, substeps)?;
-        found = Some((share, values));
-        if told {
-            break;
+    let mut share = HEAD;
+    let (mut values, mut told) = estimated(&fixed, data, share, substeps)?;
+    for more in FURTHER {
+        if !told {
+            share = more;
+            (values, told) = estimated(&fixed, data, share, substeps)?;
         }
     }
-    let (share, values) = found?;
     let full = Model::new(&fixed, data, substeps).ok()?;
     let (outputs, _) = full.simulate(&full.theta(&values));
     let prediction = data.stack(&outputs);

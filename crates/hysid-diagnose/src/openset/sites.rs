@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use hysid_plant::{Expr, Simulation, Slot as Place, State};
+use hysid_plant::{Expr, Simulation, Slot as Place};
 
-use crate::slot::{Place as Slotted, Structure, angle, is_turn};
+use crate::slot::{OWN_VELOCITY, Place as Slotted, Slot, Structure, is_turn};
 
 /// A signal that terms are written over.
 #[derive(Debug, Clone)]
@@ -115,7 +115,7 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
     });
     let others = own.as_ref().map_or(Vec::new(), |own| others(simulation, own));
     let moved = own.as_ref().filter(|own| own.iter().any(|s| s.velocity));
-    let turning = moved.map_or(Vec::new(), |own| turning(simulation, own));
+    let turning = moved.map_or(Vec::new(), |own| turning(structure, own));
     let own = own.unwrap_or_default();
     let moves_by_itself = own.iter().all(|s| s.name == state.name) && !matches!(state.derivative, Expr::Symbol(_));
     let rate = moves_by_itself.then(|| Symbol::new(&format!("rate_{}", state.name), state.derivative.clone()));
@@ -131,19 +131,23 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
 }
 
 /// The speeds and angles of what turns without a part in a slot's own coordinates, as a rotor in a machine that stands on springs.
-fn turning(simulation: &Simulation, own: &[Symbol]) -> Vec<[Symbol; 2]> {
-    let elsewhere = |name: &str| own.iter().all(|s| !s.meaning.uses(name));
-    let of_state = |state: &State| {
-        let rad = angle(&simulation.unit_of(&state.name)?)?;
-        let turned = Symbol::new(&format!("{}_rad", state.name), (rad * Expr::symbol(&state.name)).simplified());
-        let rates = state.derivative.symbols();
-        let mut speeds = rates.iter().filter(|s| simulation.state(s).is_some());
-        match (speeds.next(), speeds.next()) {
-            (Some(speed), None) if elsewhere(speed) && elsewhere(&state.name) => Some([Symbol::itself(speed), turned]),
+fn turning(structure: &Structure, own: &[Symbol]) -> Vec<[Symbol; 2]> {
+    let of_slot = |slot: &Slot| {
+        let elsewhere = |n: &str| match &slot.quantity(n)?.expression {
+            Expr::Symbol(name) if own.iter().all(|s| !s.meaning.uses(name)) => Some(name),
             _ => None,
-        }
+        };
+        let speed = elsewhere(if slot.has(OWN_VELOCITY) { OWN_VELOCITY } else { "v" })?;
+        let name = format!("{}_rad", elsewhere(slot.coordinate()?)?);
+        let text = Expr::parse(slot.angle()?).ok()?;
+        let meant = |e: Expr, n: &String| match slot.quantity(n) {
+            Some(quantity) => e.substitute(n, &quantity.expression),
+            None => e,
+        };
+        let angle = text.symbols().iter().fold(text, meant).simplified();
+        Some([Symbol::itself(speed), Symbol::new(&name, angle)])
     };
-    simulation.states.iter().filter_map(of_state).collect()
+    structure.slots.iter().filter(|s| s.place == Slotted::Force).filter_map(of_slot).collect()
 }
 
 /// The states that none of a slot's own coordinates is made of: what moves elsewhere acts through products (a swing's centrifugal force, a field's

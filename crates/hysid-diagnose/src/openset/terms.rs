@@ -98,7 +98,6 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             }
         }
         let within: Arc<[Coordinate]> = within.into();
-        let turns = site.turns();
         let mut found: Vec<Shape> = Vec::new();
         let named = |i: usize| (symbols[i].name.as_str(), series[i].as_slice());
         for rate in own..others.start {
@@ -118,7 +117,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
                 found.extend(shapes::linked((x, named(v)), other, named(others.end)));
             }
         }
-        found.extend(turns.flat_map(|[speed, angle]| shapes::unbalanced(named(speed), named(angle))));
+        found.extend(site.turns().flat_map(|[speed, angle]| shapes::unbalanced(named(speed), named(angle))));
         if plant && let (Some(first), Some(x)) = (site.own.first(), series.first()) {
             found.extend(past::echoes(&first.name, x, data));
         }

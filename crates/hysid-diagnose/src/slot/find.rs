@@ -92,8 +92,11 @@ impl Finder<'_> {
     pub(super) fn kinematic_input(&self, symbol: &str) -> Kinematic {
         let unit = self.simulation.unit_of(symbol);
         match kinematic(unit.as_ref(), symbol) {
-            Kinematic::Neither if self.is_pressure_law() && has_unit(unit.clone(), &["m3/s"]) => Kinematic::Velocity,
-            Kinematic::Neither if self.is_pressure_law() && has_unit(unit, &["m3"]) => Kinematic::Displacement,
+            Kinematic::Neither if self.is_pressure_law() => match unit {
+                Some(u) if is_one_of(&u, &["m3/s"]) => Kinematic::Velocity,
+                Some(u) if is_one_of(&u, &["m3"]) => Kinematic::Displacement,
+                _ => Kinematic::Neither,
+            },
             kind => kind,
         }
     }

@@ -102,7 +102,7 @@ pub(super) fn kinematic(unit: Option<&Unit>, name: &str) -> Kinematic {
 }
 
 /// The factor that turns a unit of angle into radians.
-pub(crate) fn angle(unit: &Unit) -> Option<Expr> {
+pub(super) fn angle(unit: &Unit) -> Option<Expr> {
     match unit.to_string().as_str() {
         "rad" => Some(Expr::Number(1.0)),
         "mrad" => Some(Expr::Number(1e-3)),
