@@ -19,6 +19,7 @@ use crate::model::base::{Base, QUANTILE};
 use crate::model::hypothesis::{Hypothesis, Setting};
 use crate::model::{Model, Values};
 use crate::refit::Problem;
+use crate::verdict::trifles::adds_trifles;
 use crate::verdict::weigh::Contest;
 
 /// Share that a set may have on average of what it and nothing would lose. Below a half: the truth may be none of the sets that were fitted.
@@ -141,15 +142,18 @@ fn expected_share(
 pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
     let Contest { pool, probability, winner, .. } = *contest;
     let recorded = &setting.data.stretches.iter().max_by_key(|s| s.len())?.drive;
-    let mut rivals: Vec<usize> =
-        (1..pool.len()).filter(|&i| i != winner && probability[i] > LIKELY && !pool[i].effects.is_empty()).collect();
+    let likely = |&i: &usize| i != winner && probability[i] > LIKELY && !pool[i].effects.is_empty();
+    // What a law that is nearly right leaves of itself is no truth, and goes anywhere on a larger input: with it a set says what it says without.
+    let (same, mut rivals): (Vec<usize>, Vec<usize>) =
+        (1..pool.len()).filter(likely).partition(|&i| adds_trifles(pool, i, winner));
+    let of_winner = probability[winner] + same.iter().map(|&i| probability[i]).sum::<f64>();
     rivals.sort_by(|&a, &b| probability[b].total_cmp(&probability[a]));
     let mut rivals: Vec<(f64, Simulation)> =
         rivals.into_iter().take(RIVALS).map(|i| (probability[i], started(&pool[i].base))).collect();
     let itself = uncertain(&pool[winner]);
     let (each, own) = match itself.len() {
-        0 => (0.0, probability[winner]),
-        n => (SHARE * probability[winner] / n as f64, (1.0 - SHARE) * probability[winner]),
+        0 => (0.0, of_winner),
+        n => (SHARE * of_winner / n as f64, (1.0 - SHARE) * of_winner),
     };
     rivals.extend(itself.into_iter().map(|s| (each, s)));
     if rivals.is_empty() {

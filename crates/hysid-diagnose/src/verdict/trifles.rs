@@ -30,6 +30,13 @@ impl Trifle {
     }
 }
 
+/// Whether a set is another one with no more than trifles added: what is told in its place says what it says. Gains count from the first of the pool.
+pub fn adds_trifles(pool: &[Hypothesis<'_>], set: usize, told: usize) -> bool {
+    let gain = |i: usize| pool[i].log_evidence - pool[0].log_evidence;
+    let (more, key) = (pool[set].key(), pool[told].key());
+    more.len() > key.len() && key.iter().all(|e| more.contains(e)) && gain(set) < (1.0 + TRIFLE) * gain(told)
+}
+
 /// The set of a pool that is told in the place of the `winner`: the same without the members that add next to nothing, the least first, and what these are.
 /// A member stays where the set without it was not fitted, and where that set leaves a larger error than the simulation as it is (`simulation`, where it
 /// leaves the least) and this one does not: under a noise that wanders a constant force brings little evidence, and most of the error may be its. What is

@@ -1,7 +1,7 @@
 //! Dry friction of different size in the two directions.
 
 use super::{is_there, sign};
-use crate::mechanism::{Block, Family, Law, Mechanism, Need};
+use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
 /// Dry friction of different size in the two directions.
@@ -12,10 +12,18 @@ pub static ASYMMETRIC_FRICTION: Mechanism = Mechanism {
     places: &[Place::Force, Place::Connection, Place::ForceLaw],
     applies: |slot| slot.has("v"),
     already: &["step(v)", "step(-v)", "abs(sign(v))", "sign(v)*sign(v)", "sign(v)^2"],
-    law: |slot, _| {
+    law: |slot, purpose| {
         if is_there(slot) {
             // The symmetric part is there already: only what the directions differ by.
-            return Law::force(format!("F_a*abs({})", sign(slot))).amplitude("F_a", "F", -1.0, 1.0).sum_of_others();
+            let dry = format!("F_a*abs({})", sign(slot));
+            return match purpose {
+                // What slides in grease, too.
+                Purpose::Form(Form::Finer) => {
+                    let law = Law::force(format!("{dry} + c_a*abs(v)")).amplitude("F_a", "F", -1.0, 1.0);
+                    law.amplitude("c_a", "F/v", -1.0, 1.0)
+                }
+                _ => Law::force(dry).amplitude("F_a", "F", -1.0, 1.0).sum_of_others(),
+            };
         }
         // Dry friction and a constant force, sticking included.
         Law::force("(F_c + F_a*sign(v))*sign(v)")

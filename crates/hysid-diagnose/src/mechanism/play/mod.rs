@@ -7,10 +7,17 @@ use crate::slot::Slot;
 
 pub use backlash::BACKLASH;
 
-/// Free play in what connects two parts, in its dead-zone form: no force within this half-width of the middle. A gear has backlash, a spring a clearance.
+/// Why neither name of it is firm.
+const ONE_LAW: &str = "between two parts the free play of a spring and the backlash of a coupling are one law";
+
+/// Free play in what connects two parts, in its dead-zone form: no force within this half-width of the middle. A gear has backlash, a spring a clearance, and
+/// who looks at a shaft calls it the one or the other.
 pub(super) fn in_a_coupling(slot: &Slot, purpose: Purpose, width: &'static str) -> Law {
     let gap = Grid::Reach("x", log_steps(0.02, 0.7, 6));
-    let open = |text: String| Law::force(text).shape(width, "x", gap.clone()).within(0.0, 3.0).neutral(0.0);
+    let open = |text: String| {
+        let law = Law::force(text).shape(width, "x", gap.clone()).within(0.0, 3.0).neutral(0.0);
+        law.told_from(f64::INFINITY, "x", ONE_LAW)
+    };
     let missing = format!("k*max(min(x, {width}), -{width})");
     match purpose {
         Purpose::Screening => Law::force(format!("-w*{missing}")).weight().shape(width, "x", gap),
