@@ -192,12 +192,15 @@ pub fn changes(name: &str, x: &[Vec<f64>], data: &DataSet) -> Vec<Shape> {
     out
 }
 
-/// A coordinate with a coefficient that follows an input, its size or its square, as a brake in series with a motor does.
-pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 3] {
+/// A coordinate with a coefficient that follows an input, its size or its square, as a brake in series with a motor does; an input with one that follows a
+/// coordinate on either side of the middle, as the force of a coil that leaves its magnet.
+pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> [Shape; 5] {
     [
         product((u, input), (name, x)),
         Shape::new(format!("{u}^2*{name}"), Kind::Odd, both(input, x, |u, x| u * u * x)),
         Shape::new(format!("abs({u})*{name}"), Kind::Odd, both(input, x, |u, x| u.abs() * x)),
+        Shape::new(format!("{u}*{name}^2"), Kind::Odd, both(input, x, |u, x| u * x * x)),
+        Shape::new(format!("{u}*abs({name})"), Kind::Odd, both(input, x, |u, x| u * x.abs())),
     ]
 }
 
@@ -293,7 +296,7 @@ type Factor<'f> = (String, bool, Box<dyn Fn(f64) -> f64 + 'f>);
 
 /// Products of a function of the displacement `x` and one of the velocity `v`, and what is periodic in the displacement. A resistance
 /// that is proportional to the speed, one that has its sign only and one that has its size only may each depend on the place: in proportion to it or
-/// to its size, on one side of a knee, or in waves: some over its range, and where it is an angle (`radians` for each of its unit) those that
+/// to its size, by the side of the middle, on one side of a knee, or in waves: some over its range, and where it is an angle (`radians` for each of its unit) those that
 /// return with every turn and with every half.
 pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>]), radians: Option<f64>) -> Vec<Shape> {
     let speeds: [Factor<'_>; 3] = [
@@ -305,6 +308,7 @@ pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>]), radians
         (a.to_owned(), true, Box::new(|x| x)),
         (format!("abs({a})"), false, Box::new(f64::abs)),
         (format!("{a}^2"), false, Box::new(|x| x * x)),
+        (format!("sign({a})"), true, Box::new(f64::signum)),
     ];
     for g in quantiles(x, KNEES).into_iter().filter(|g| *g > 0.0) {
         let (n, s, width) = (free(g), GATE * g, free(GATE * g));
