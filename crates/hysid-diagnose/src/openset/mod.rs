@@ -355,6 +355,22 @@ mod tests {
         assert!(first.term.starts_with("max(rate_fin") && first.coefficient < -0.3, "{first:?}");
     }
 
+    /// The force of a loudspeaker's coil falls as it leaves the magnet.
+    #[test]
+    fn a_coil_that_leaves_its_magnet_is_seen() {
+        let text = "[time]\nperiod_s = 0.02\n[inputs]\ni = \"coil_A\"\n[parameters]\nB = { value = 5.0, fixed = true, unit = \"N/A\" }\n\
+                    m = { value = 1.0, min = 0.3, max = 3.0, unit = \"kg\" }\nc = { value = 2.0, min = 0.5, max = 8.0, unit = \"N s/m\" }\n\
+                    k = { value = 80.0, min = 30.0, max = 200.0, unit = \"N/m\" }\n[states]\nx = { derivative = \"v\", initial = 0.0, unit = \"m\" }\n\
+                    v = { derivative = \"(B*i - c*v - k*x)/m\", initial = 0.0, unit = \"m/s\" }\n[outputs]\ny_m = \"x\"\n";
+        let mut random = normal(9);
+        let i: Vec<f64> = drive(1500, &mut random).into_iter().map(|x| x / 3.0).collect();
+        let falls = ("v", "(B*i*(1 - 3*x^2) - c*v - k*x)/m");
+        let found = seen(text, falls, ("coil_A", i), "y_m", (0.005, &mut random));
+        let first = &found.record.terms[0];
+        assert_eq!(first.term, "i*x^2", "{:?}", found.record.terms);
+        assert!((first.coefficient / -15.0 - 1.0).abs() < 0.3, "{first:?}");
+    }
+
     /// A force that comes late, as from the cut of the turn before, with a noise of one in a hundred.
     #[test]
     fn a_delayed_feedback_is_seen() {

@@ -83,8 +83,9 @@ mod tests {
     use crate::search::screen::screen;
     use hysid_plant::Simulation;
 
-    /// Of a hard spring and an offset of the sensor of so many noise standard deviations, what is told, and how many of them are not.
-    fn told(offset: f64) -> (Vec<&'static str>, usize) {
+    /// Of a hard spring and an offset of the sensor of so many noise standard deviations, what is told, how many of them are not, and whether both say
+    /// what the spring says.
+    fn told(offset: f64) -> (Vec<&'static str>, usize, bool) {
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let mut random = normal(5);
         let u = drive(1200, &mut random);
@@ -104,12 +105,19 @@ mod tests {
         let (both, offset) = (fitted(&spring, "output_offset"), fitted(&none, "output_offset"));
         let pool = [none, spring, offset, both];
         let (place, trifles) = without_trifles(&pool, 3, 0, &pool[0]);
-        (pool[place].effects.iter().map(|e| e.mechanism.id).collect(), trifles.len())
+        // Nor does a set say the same that has less in it, or something else.
+        assert!(!adds_trifles(&pool, 1, 3) && !adds_trifles(&pool, 2, 1) && !adds_trifles(&pool, 1, 1));
+        (pool[place].effects.iter().map(|e| e.mechanism.id).collect(), trifles.len(), adds_trifles(&pool, 3, 1))
     }
 
     #[test]
     fn what_adds_next_to_nothing_is_not_told() {
-        assert_eq!(told(0.0), (vec!["cubic_stiffness"], 1));
-        assert_eq!(told(1.5), (vec!["cubic_stiffness", "output_offset"], 0));
+        assert_eq!((told(0.0).0, told(0.0).1), (vec!["cubic_stiffness"], 1));
+        assert_eq!((told(1.5).0, told(1.5).1), (vec!["cubic_stiffness", "output_offset"], 0));
+    }
+
+    #[test]
+    fn what_adds_trifles_says_the_same() {
+        assert_eq!([told(0.0).2, told(1.5).2], [true, false]);
     }
 }

@@ -39,6 +39,20 @@ mod tests {
     use hysid_plant::{Compiled, Drive, Run, Simulation};
 
     use super::*;
+    use crate::mechanism::conformance::slot_where;
+    use crate::mechanism::stiffness::SPRING_CLEARANCE;
+    use crate::slot::Place;
+
+    #[test]
+    fn between_two_parts_neither_name_is_firm() {
+        for mechanism in [&BACKLASH, &SPRING_CLEARANCE] {
+            let slot = slot_where(mechanism, |slot| slot.place == Place::Connection).unwrap();
+            for (_, law) in mechanism.forms(&slot) {
+                let never = law.parameters.iter().filter_map(|p| p.told_from.as_ref()).any(|t| t.1 == f64::INFINITY);
+                assert!(never, "{}", mechanism.id);
+            }
+        }
+    }
 
     /// A play that came from somewhere answers as one whose memory stood there: closed form, sample by sample.
     #[test]
