@@ -175,8 +175,12 @@ impl Display for Unit {
             return f.write_str("-");
         }
         let side = |positive: bool| {
-            let chosen = self.factors.iter().filter(|(_, e)| (*e > 0) == positive);
-            let text = chosen.map(|(name, exponent)| match exponent.abs() {
+            let mut chosen: Vec<_> = self.factors.iter().filter(|(_, e)| (*e > 0) == positive).collect();
+            // A metre before another unit would be read as a thousandth of that.
+            if chosen.first().is_some_and(|(name, e)| name == "m" && e.abs() == ONE) {
+                chosen.rotate_left(1);
+            }
+            let text = chosen.into_iter().map(|(name, exponent)| match exponent.abs() {
                 ONE => name.clone(),
                 exponent => format!("{name}^{}", f64::from(exponent) / f64::from(ONE)),
             });

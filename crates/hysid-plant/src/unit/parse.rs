@@ -248,6 +248,8 @@ mod tests {
         check("kgm2", "kgm2");
         check("cm2.5/s", "cm^2.5/s");
         check("N.m2.s", "N m^2 s");
+        check("m N", "N m");
+        check("1/(m K)", "1/(K m)");
         check("1e-8 W/K4", "1e-8 W/K^4");
         check("10^-8 W/(m2 K4)", "W/(10^8 m^2 K^4)");
         check("1.0 m", "m");
