@@ -237,6 +237,26 @@ pub fn recorded<const N: usize>(simulation: &Simulation, period_s: f64, columns:
     DataSet::new(simulation, &[recording], 3).unwrap()
 }
 
+/// For tests: what a simulation records where a state has another derivative, its one output with a noise of this share of its rms.
+#[cfg(test)]
+pub fn lacking_a_law(
+    simulation: &Simulation,
+    (state, derivative): (&str, &str),
+    period_s: f64,
+    (input, u): (&str, Vec<f64>),
+    (noise, random): (f64, &mut dyn FnMut() -> f64),
+) -> DataSet {
+    use hysid_plant::{Compiled, Drive, Expr, Run};
+    let mut truth = simulation.clone();
+    truth.state_mut(state).unwrap().derivative = Expr::parse(derivative).unwrap();
+    let compiled = Compiled::new(&truth).unwrap();
+    let run = Drive::new(0.0, period_s, u.len(), vec![u.clone()]).unwrap();
+    let mut y = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs.swap_remove(0);
+    let noise = noise * crate::oscillator::rms(&y);
+    y.iter_mut().for_each(|y| *y += noise * random());
+    recorded(simulation, period_s, [(input, u), (&simulation.outputs[0].column, y)])
+}
+
 /// For tests: a simulation calibrated on a data set from its own values, and what its fits share.
 #[cfg(test)]
 pub fn calibrated<'d>(

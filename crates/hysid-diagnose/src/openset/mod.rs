@@ -256,7 +256,7 @@ mod tests {
 
     use super::*;
     use crate::budget::Budget;
-    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::model::hypothesis::{calibrated, lacking_a_law, recorded};
     use crate::oscillator::{drive, normal, rms};
 
     const PERIOD: f64 = 0.02;
@@ -318,22 +318,9 @@ mod tests {
     }
 
     /// What is said to be missing in a simulation, where a state of the truth has another derivative and the one output a noise of this share.
-    fn seen(
-        text: &str,
-        (state, derivative): (&str, &str),
-        (input, u): (&str, Vec<f64>),
-        output: &str,
-        (noise, random): (f64, &mut dyn FnMut() -> f64),
-    ) -> OpenSet {
+    fn seen(text: &str, law: (&str, &str), drive: (&str, Vec<f64>), noise: (f64, &mut dyn FnMut() -> f64)) -> OpenSet {
         let original = Simulation::parse(text, "test.sim.toml").unwrap();
-        let mut truth = original.clone();
-        truth.state_mut(state).unwrap().derivative = hysid_plant::Expr::parse(derivative).unwrap();
-        let compiled = Compiled::new(&truth).unwrap();
-        let run = Drive::new(0.0, PERIOD, u.len(), vec![u.clone()]).unwrap();
-        let mut y = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs.swap_remove(0);
-        let noise = noise * rms(&y);
-        y.iter_mut().for_each(|y| *y += noise * random());
-        let data = recorded(&original, PERIOD, [(input, u), (output, y)]);
+        let data = lacking_a_law(&original, law, PERIOD, drive, noise);
         let budget = Budget::new(&|_| false);
         let (_, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         correction(&none.base, NoiseKind::White(1.0)).unwrap()
@@ -349,7 +336,7 @@ mod tests {
         let steps: Vec<f64> = (0..30).map(|_| 4.0 * random()).collect();
         let dc: Vec<f64> = (0..1500).map(|n| steps[n / 50]).collect();
         let limited = ("fin", "max(min((dc - fin)/ta, 40), -40)");
-        let found = seen(text, limited, ("command_deg", dc), "roll_deg_s", (0.005, &mut random));
+        let found = seen(text, limited, ("command_deg", dc), (0.005, &mut random));
         let first = &found.record.terms[0];
         assert_eq!(found.record.slot, "state:fin", "{:?}", found.record.terms);
         assert!(first.term.starts_with("max(rate_fin") && first.coefficient < -0.3, "{first:?}");
@@ -365,7 +352,7 @@ mod tests {
         let mut random = normal(9);
         let i: Vec<f64> = drive(1500, &mut random).into_iter().map(|x| x / 3.0).collect();
         let falls = ("v", "(B*i*(1 - 3*x^2) - c*v - k*x)/m");
-        let found = seen(text, falls, ("coil_A", i), "y_m", (0.005, &mut random));
+        let found = seen(text, falls, ("coil_A", i), (0.005, &mut random));
         let first = &found.record.terms[0];
         assert_eq!(first.term, "i*x^2", "{:?}", found.record.terms);
         assert!((first.coefficient / -15.0 - 1.0).abs() < 0.3, "{first:?}");
@@ -381,7 +368,7 @@ mod tests {
         let mut random = normal(6);
         let u = drive(1500, &mut random);
         let late = ("v", "(u - c*v - k*x - 12*delay(x, 0.37))/m");
-        let found = seen(text, late, ("force_N", u), "y_m", (0.01, &mut random));
+        let found = seen(text, late, ("force_N", u), (0.01, &mut random));
         let first = &found.record.terms[0];
         let late = first.term.strip_prefix("delay(x, ").and_then(|t| t.strip_suffix(')'));
         let late: f64 = late.unwrap_or_else(|| panic!("{:?}", found.record.terms)).parse().unwrap();

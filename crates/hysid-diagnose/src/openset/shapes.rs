@@ -296,8 +296,8 @@ type Factor<'f> = (String, bool, Box<dyn Fn(f64) -> f64 + 'f>);
 
 /// Products of a function of the displacement `x` and one of the velocity `v`, and what is periodic in the displacement. A resistance
 /// that is proportional to the speed, one that has its sign only and one that has its size only may each depend on the place: in proportion to it or
-/// to its size, by the side of the middle, on one side of a knee, or in waves: some over its range, and where it is an angle (`radians` for each of its unit) those that
-/// return with every turn and with every half.
+/// to its size, by the side of the middle, on one side of a knee, or in waves: some over its range, and where it is an angle (`radians` for each of its
+/// unit) those that return with every turn and with every half.
 pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>]), radians: Option<f64>) -> Vec<Shape> {
     let speeds: [Factor<'_>; 3] = [
         (b.to_owned(), true, Box::new(|v| v)),

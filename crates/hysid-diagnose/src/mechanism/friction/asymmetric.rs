@@ -16,13 +16,11 @@ pub static ASYMMETRIC_FRICTION: Mechanism = Mechanism {
         if is_there(slot) {
             // The symmetric part is there already: only what the directions differ by.
             let dry = format!("F_a*abs({})", sign(slot));
+            let unequal = |text: String| Law::force(text).amplitude("F_a", "F", -1.0, 1.0);
             return match purpose {
                 // What slides in grease, too.
-                Purpose::Form(Form::Finer) => {
-                    let law = Law::force(format!("{dry} + c_a*abs(v)")).amplitude("F_a", "F", -1.0, 1.0);
-                    law.amplitude("c_a", "F/v", -1.0, 1.0)
-                }
-                _ => Law::force(dry).amplitude("F_a", "F", -1.0, 1.0).sum_of_others(),
+                Purpose::Form(Form::Finer) => unequal(format!("{dry} + c_a*abs(v)")).amplitude("c_a", "F/v", -1.0, 1.0),
+                _ => unequal(dry).sum_of_others(),
             };
         }
         // Dry friction and a constant force, sticking included.
@@ -45,12 +43,12 @@ pub static ASYMMETRIC_FRICTION: Mechanism = Mechanism {
 
 #[cfg(test)]
 mod tests {
-    use hysid_plant::{Compiled, Drive, Expr, Run, Simulation};
+    use hysid_plant::Simulation;
 
     use super::*;
     use crate::budget::Budget;
     use crate::model::base::NoiseKind;
-    use crate::model::hypothesis::{calibrated, recorded};
+    use crate::model::hypothesis::{calibrated, lacking_a_law};
     use crate::oscillator::{drive, normal, rms};
     use crate::search::fitting::refit;
     use crate::search::screen::screen;
@@ -64,19 +62,12 @@ mod tests {
                     w = { derivative = \"(u - b*w - M*sign(w) - k*q)/J\", initial = 0.0, unit = \"rad/s\" }\n[outputs]\nq_rad = \"q\"\n";
         let original = Simulation::parse(text, "axis.sim.toml").unwrap();
         let (dry, viscous) = (0.05, 0.02);
-        let mut truth = original.clone();
         let unequal = format!("(u - b*w - M*sign(w) - k*q - {dry}*abs(sign(w)) - {viscous}*abs(w))/J");
-        truth.state_mut("w").unwrap().derivative = Expr::parse(&unequal).unwrap();
         let mut random = normal(8);
         let u = drive(1500, &mut random);
         let size = 1.5 / rms(&u);
         let u: Vec<f64> = u.into_iter().map(|x| size * x).collect();
-        let compiled = Compiled::new(&truth).unwrap();
-        let run = Drive::new(0.0, 0.02, u.len(), vec![u.clone()]).unwrap();
-        let mut y = compiled.simulate(&Run::new(&run, &compiled.theta())).outputs.swap_remove(0);
-        let noise = 0.005 * rms(&y);
-        y.iter_mut().for_each(|y| *y += noise * random());
-        let data = recorded(&original, 0.02, [("torque_Nm", u), ("q_rad", y)]);
+        let data = lacking_a_law(&original, ("w", &unequal), 0.02, ("torque_Nm", u), (0.005, &mut random));
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let evidence = none.base.evidence();
