@@ -7,6 +7,7 @@
 mod autoregression;
 mod cosine;
 mod excitation;
+mod median;
 mod noise;
 mod range;
 mod recording;
@@ -17,6 +18,7 @@ mod turning_points;
 pub use autoregression::Autoregression;
 pub use cosine::{cosine_transform, inverse_cosine_transform};
 pub use excitation::{Excitation, ExcitationError, modulate};
+pub use median::median;
 pub use noise::{NoiseError, autoregressive_noise, variance_for_snr, white_noise};
 pub use range::range;
 pub use recording::{Channel, Clock, Recording, RecordingError, Segment};

@@ -127,8 +127,8 @@ fn measure(args: &Args, u: &[f64], y: &[f64]) -> Result<Value, Failure> {
         "tool": "hysid", "version": env!("CARGO_PKG_VERSION"), "variant": format!("{:?}", args.search).to_lowercase(),
         "n": y.len(), "ny": args.ny, "nu": args.nu, "degree": args.degree, "u0": args.u0, "terms": args.terms,
         "candidates": candidates,
-        "wall_s": wall, "wall_median_s": median(&wall), "wall_min_s": least(&wall),
-        "cpu_s": cpu, "cpu_median_s": median(&cpu), "loadavg": load_average(),
+        "wall_s": wall, "wall_median_s": hysid_signal::median(wall.clone()), "wall_min_s": least(&wall),
+        "cpu_s": cpu, "cpu_median_s": hysid_signal::median(cpu.clone()), "loadavg": load_average(),
         "threads": rayon::current_num_threads(),
         "peak_rss_mib": status("VmHWM:"), "base_rss_mib": base_rss,
         "selected": names, "coefs": selection.theta,
@@ -169,7 +169,7 @@ fn free_run(args: &Args, u: &[f64], y: &[f64], terms: Vec<Term>, selection: &Sel
         let run = model.free_run(&[&u[..n]], start, n, 1e6).map_err(Failure::bad_input)?;
         rates.push(run.diverged_at.unwrap_or(n) as f64 / began.elapsed().as_secs_f64());
     }
-    Ok(median(&rates))
+    Ok(hysid_signal::median(rates))
 }
 
 /// The term as the comparison writes it: `u[k-1]*y[k-2]`, input before output, powers written out.
@@ -191,12 +191,6 @@ fn truth_beside(data: &Path) -> Option<Vec<String>> {
     let text = std::fs::read_to_string(data.with_extension("json")).ok()?;
     let value: Value = serde_json::from_str(&text).ok()?;
     Some(value.get("truth")?.as_object()?.keys().cloned().collect())
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn least(values: &[f64]) -> f64 {

@@ -5,7 +5,7 @@
 //! anything that may jump (an input, the sign of a velocity) is left as it is.
 
 use hysid_plant::{Expr, Simulation};
-use hysid_signal::range;
+use hysid_signal::{median, range};
 
 use super::DataSet;
 use crate::evidence::Series;
@@ -127,12 +127,6 @@ fn glitches(e: &[f64], y: &[f64]) -> Vec<(usize, f64)> {
     };
     let found: Vec<(usize, f64)> = inner.filter(stands_out).map(|n| (n, deviation(n))).collect();
     if scale > 0.0 && found.len() as f64 <= MOST * e.len() as f64 { found } else { Vec::new() }
-}
-
-/// The middle one of some values; 0 where there are none.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 #[cfg(test)]

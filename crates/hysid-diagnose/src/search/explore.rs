@@ -133,7 +133,11 @@ pub fn explore<'a, 'd>(
         (hooks.progress)("refitting the likeliest effects without a noise model");
         pool = search.under_noise(&none, &plainly.glance(start, found));
     }
-    if !significant {
+    // Evidence counts all samples alike: where the noise is not, what is fitted gains as much by chance.
+    if test.unequal {
+        notes.push("the residual is far larger at some samples than at others, and noise that is so at the same samples makes more of the effects there than noise of one size does: evidence is compared with what such noise does".into());
+    }
+    if !significant && !test.unequal {
         (hooks.progress)("taking a second look");
         let seen = match &gross {
             Some((start, found)) => {

@@ -96,7 +96,7 @@ impl<'d> Judgement<'d> {
         let lacking = lacking(best, candidates);
         support.iter_mut().zip(&lacking).filter(|(_, l)| l.is_some()).for_each(|(s, _)| s.weaken());
         // A search that was cut short has not heard all rivals.
-        if unfinished() {
+        if unfinished() || rest.is_unequal() {
             support.iter_mut().for_each(Support::weaken);
         }
         // Where one of several effects that only the second look sees is not known, the others may be parts of the same imitation (development seed

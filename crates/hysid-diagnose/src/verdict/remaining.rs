@@ -92,6 +92,11 @@ impl<'d> Remaining<'d> {
         Self { test, open, instead, swapped, tried, written: None, foreign, spectrum, imperfect, pushed, alpha }
     }
 
+    /// Whether what is left is of unequal size in a way that matters: evidence counts its samples alike.
+    pub fn is_unequal(&self) -> bool {
+        self.test.as_ref().is_some_and(|t| t.unequal)
+    }
+
     /// As it is reported; `None` where it was not looked at.
     pub fn record(&self, pool: &[Hypothesis<'_>], winner: usize) -> Option<RemainingRecord> {
         let p = self.test.as_ref().map(|t| if self.pushed { 1.0 } else { t.p_value })?;
