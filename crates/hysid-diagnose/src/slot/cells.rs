@@ -1,10 +1,11 @@
 //! Load cells: outputs that measure what holds a part, or what connects it to another. An effect that acts there is in them too, or beside them: what a
 //! bearing of the machine rubs with is not in what a cell under the spring feels.
 
-use hysid_plant::{Output, Unit};
+use hysid_plant::{Expr, Output, Unit};
 
 use super::balance::is_power_of_ten;
 use super::find::{Finder, presses};
+use super::motion::Motion;
 use super::sensed::{Felt, Sensed, multiple, peeled, shares};
 use super::{Place, Slot, Target};
 
@@ -12,6 +13,15 @@ impl Finder<'_> {
     /// The force slots once more whose forces a load cell measures, as those that it feels.
     pub(super) fn in_load_cells(&self, slots: &[Slot]) -> Vec<Slot> {
         slots.iter().filter_map(|slot| self.in_load_cell(slot)).collect()
+    }
+
+    /// What a connection pulls at a part with where its deflection is a state of its own, but for what goes by the rate of that.
+    fn force_of_deflection(&self, slot: &Slot, motion: &Motion<'_>) -> Option<Expr> {
+        let symbols = slot.quantity("x")?.expression.symbols();
+        let mut states = symbols.iter().filter(|s| self.simulation.state(s).is_some());
+        let (deflection, None) = (states.next()?, states.next()) else { return None };
+        let counts = |term: &Expr| !self.moves(deflection) && term.uses(deflection);
+        self.sum_of_forces(motion, &counts)
     }
 
     fn in_load_cell(&self, slot: &Slot) -> Option<Slot> {
@@ -24,7 +34,8 @@ impl Finder<'_> {
         let Target::Derivatives(pulls) = &slot.target else { return None };
         let state = &pulls.first()?.state;
         let motion = self.motions.iter().find(|m| m.state == state)?;
-        let (scale, held) = peeled(&self.forces_on(motion, connects)?);
+        let held = self.forces_on(motion, connects).or_else(|| self.force_of_deflection(slot, motion))?;
+        let (scale, held) = peeled(&held);
         let cell = |output: &Output| {
             let (factor, inner) = peeled(&output.expression);
             let is_force = Unit::of_column(&output.column).is_none_or(|u| presses(&u));
@@ -63,6 +74,27 @@ mod tests {
              [outputs]\npad_kN = \"{cell}\"\npiston_mm = \"x\"\n"
         );
         Simulation::parse(&text, "caliper.sim.toml").unwrap()
+    }
+
+    #[test]
+    fn what_a_cable_pulls_with_is_measured_where_it_is_all_that_its_stretch_does() {
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nu = \"drum_m_s\"\n[parameters]\nk = { value = 25.0, min = 1.0, unit = \"N/m\" }\n\
+            c = { value = 0.1, min = 0.01, unit = \"N s/m\" }\nm = { value = 2.0, min = 0.1, unit = \"kg\" }\n\
+            [states]\ne = { derivative = \"u - v\", initial = 0.0, unit = \"m\" }\nv = { derivative = \"(k*e + c*(u - v))/m\", initial = 0.0, unit = \"m/s\" }\n\
+            [outputs]\nload_m_s2 = \"(k*e + c*(u - v))/m\"\ncable_N = \"k*e\"\n";
+        let simulation = Simulation::parse(text, "hoist.sim.toml").unwrap();
+        let spring = mechanism("quadratic_stiffness").unwrap();
+        let written = |slot: &crate::slot::Slot| {
+            let signals = example_signals(&simulation, slot);
+            let written = spring.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap().simulation;
+            written.outputs.iter().map(|o| o.expression.to_string()).collect::<Vec<_>>()
+        };
+        let slots = spring.slots(&Structure::of(&simulation));
+        assert!(
+            slots.iter().any(|s| written(s)[1] == "k*e - k_2*(-e)^2"),
+            "{:?}",
+            slots.iter().map(written).collect::<Vec<_>>()
+        );
     }
 
     #[test]

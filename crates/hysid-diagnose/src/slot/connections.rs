@@ -156,7 +156,9 @@ impl Finder<'_> {
             let (name, rate) = (state.name.as_str(), &state.derivative);
             let felt = |m: &&Motion<'_>| rate.uses(m.v) && m.derivative.uses(name);
             let mut between = self.motions.iter().filter(felt);
-            let (Some(one), Some(other), None) = (between.next(), between.next(), between.next()) else { return None };
+            let (Some(one), Some(other), None) = (between.next(), between.next(), between.next()) else {
+                return self.twist_to_ground(state);
+            };
             let only = |s: &String| s == one.v || s == other.v || s == "pi" || self.simulation.parameter(s).is_some();
             if !rate.symbols().iter().all(only) {
                 return None;

@@ -79,9 +79,14 @@ impl Finder<'_> {
             others().any(|m| term.uses(m.v) || m.x.is_some_and(|x| term.uses(x)))
                 || wound.iter().any(|s| term.uses(&s.name))
         };
-        let terms = forces_of(simulation, motion).filter(|(_, term)| passed(term) == from_others);
+        self.sum_of_forces(motion, &|term| passed(term) == from_others)
+    }
+
+    /// The force on a part by the terms of which this is true; `None` where there is none.
+    pub(super) fn sum_of_forces(&self, motion: &Motion<'_>, counts: &dyn Fn(&Expr) -> bool) -> Option<Expr> {
+        let terms = forces_of(self.simulation, motion).filter(|(_, term)| counts(term));
         let sum = terms.map(|(sign, term)| product(vec![Expr::Number(sign), term.clone()])).reduce(|a, b| a + b)?;
-        let load = match force_path(simulation, motion.derivative) {
+        let load = match force_path(self.simulation, motion.derivative) {
             ForcePath::Divided(mass) => mass.clone() * sum,
             ForcePath::Quotient(..) | ForcePath::Bare => sum,
         };

@@ -1,6 +1,6 @@
 //! The slots between a moving part and a motion that an input prescribes: the ground under a structure, the road under a tyre.
 
-use hysid_plant::Expr;
+use hysid_plant::{Expr, State};
 
 use super::Slot;
 use super::algebra::{constant_coefficient, quotient, unless_one};
@@ -45,6 +45,39 @@ impl Finder<'_> {
         slots
     }
 
+    /// The connection whose deflection is a state of its own, the velocity that an input prescribes less that of a part, or the other way round: a cable on a drum.
+    pub(super) fn twist_to_ground(&self, state: &State) -> Option<Slot> {
+        let (name, rate) = (state.name.as_str(), &state.derivative);
+        let mut felt = self.motions.iter().filter(|m| rate.uses(m.v) && m.derivative.uses(name));
+        let (one, None) = (felt.next()?, felt.next()) else { return None };
+        let own = constant_coefficient(self.simulation, rate, one.v)?;
+        let symbols = rate.symbols();
+        let mut given = symbols.iter().filter(|s| self.simulation.input(s).is_some());
+        let (input, None) = (given.next()?, given.next()) else { return None };
+        let ground = rate.replace(&Expr::symbol(input).derivative_of_input(), &Expr::symbol(input));
+        let moves = match self.kinematic_input(input) {
+            Kinematic::Velocity => ground == *rate,
+            Kinematic::Displacement => ground != *rate,
+            Kinematic::Neither => false,
+        };
+        let other = constant_coefficient(self.simulation, &ground, input)?;
+        let only = |s: &String| s == one.v || s == input || s == "pi" || self.simulation.parameter(s).is_some();
+        if !moves || is_negative(&own) == is_negative(&other) || !symbols.iter().all(only) {
+            return None;
+        }
+        // The part's own motion counts positively.
+        let of_the_part = |e: Expr| if is_negative(&own) { -e } else { e };
+        let stretch = Stretch {
+            x: of_the_part(Expr::symbol(name)),
+            v: of_the_part(rate.clone()).simplified(),
+            symbol: name,
+            lever: None,
+            other: None,
+            words: format!("across {name}"),
+        };
+        Some(self.connection(one, stretch))
+    }
+
     /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too: `0.001` of a road in mm.
     fn travel(&self, one: &Motion<'_>, x: &str, input: &str) -> Option<Expr> {
         // The rate of an acceleration balances no forces: what stands there is a servo's.
@@ -66,6 +99,21 @@ impl Finder<'_> {
 mod tests {
     use super::super::Place;
     use super::super::connections::tests::{slots, slots_driven};
+
+    #[test]
+    fn a_cable_on_a_drum_stretches_between_the_load_and_what_the_input_prescribes() {
+        let check = |column: &str, stretch: &str, pull: &str, expected: Option<[&str; 4]>| {
+            let found = slots_driven(column, Place::Connection, &[("z", stretch, "m"), ("w2", pull, "m/s")]);
+            let expected: Vec<_> = expected.map(|slot| slot.map(str::to_owned)).into_iter().collect();
+            assert_eq!(found, expected, "{column} {stretch}");
+        };
+        check("drum_m_s", "u - w2", "(k*z + c*(u - w2))/J", Some(["-z", "-(u - w2)", "k", "-w2"]));
+        check("drum_m_s", "w2 - u", "(-k*z - c*w2)/J", Some(["z", "w2 - u", "k", "-w2"]));
+        check("drum_m", "d(u) - w2", "k*z/J", Some(["-z", "-(d(u) - w2)", "k", "-w2"]));
+        check("drum_m", "u - w2", "k*z/J", None);
+        check("pull_N", "u - w2", "k*z/J", None);
+        check("drum_m_s", "u + w2", "-k*z/J", None);
+    }
 
     #[test]
     fn a_motion_that_an_input_prescribes_is_ground_and_a_reference_is_none() {
