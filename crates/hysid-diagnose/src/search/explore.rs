@@ -67,10 +67,17 @@ fn gains(none: &Hypothesis<'_>, sets: &[Hypothesis<'_>]) -> Vec<(Key, f64)> {
     sets.iter().map(|h| (h.key(), h.log_evidence - none.log_evidence)).collect()
 }
 
-/// Whether all sets that were fitted with shorter steps gain what they gained before.
+/// Whether shorter steps tell nothing of sets: those within [`CLEAR`] of the best, with the one steps or the other, gain as much more or less as the likeliest, which comes
+/// first, and that gains no less. What all of them gain the simulation without effects has lost.
 fn unmoved(before: &[(Key, f64)], now: &[(Key, f64)]) -> bool {
-    let held = |(key, gain): &(Key, f64)| before.iter().any(|(k, g)| k == key && (gain - g).abs() < MOVED);
-    !now.is_empty() && now.iter().all(held)
+    let both = now.iter().map(|(key, gain)| Some((before.iter().find(|(k, _)| k == key)?.1, *gain)));
+    let Some(both) = both.collect::<Option<Vec<(f64, f64)>>>() else { return false };
+    let Some(&(first, then)) = both.first() else { return false };
+    let highest = |of: fn(&(f64, f64)) -> f64| both.iter().map(of).fold(f64::NEG_INFINITY, f64::max) - CLEAR;
+    let (far, farther) = (highest(|b| b.0), highest(|b| b.1));
+    let near = both.iter().filter(|(before, now)| *before > far || *now > farther);
+    let moved = |(before, now): &(f64, f64)| now - before - (then - first);
+    then - first > -MOVED && near.map(moved).all(|m| m.abs() < MOVED)
 }
 
 /// Puts what a glance has fitted into a pool, and tells what it was.
@@ -266,6 +273,10 @@ mod tests {
         let set = |slot: &str, gain: f64| (vec![("delay", slot.to_owned())], gain);
         let before = [set("input:u", 140.0), set("output:y", 139.0), set("input:w", 20.0)];
         assert!(unmoved(&before, &[set("output:y", 139.4), set("input:u", 141.0)]));
+        assert!(unmoved(&before, &[set("input:u", 170.0), set("output:y", 169.4)]), "all of them by as much");
+        assert!(!unmoved(&before, &[set("input:u", 110.0), set("output:y", 109.0)]), "they lose what they had");
+        let other = |gain: f64| unmoved(&before, &[set("input:u", 140.0), set("input:w", gain)]);
+        assert!(other(110.0) && !other(132.0), "what is far behind, and what is no more");
         assert!(!unmoved(&before, &[set("output:y", 139.4), set("input:u", 100.0)]));
         assert!(!unmoved(&before, &[set("input:z", 139.4)]) && !unmoved(&before, &[]));
     }

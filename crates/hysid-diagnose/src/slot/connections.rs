@@ -1,6 +1,6 @@
 //! The slots between two moving parts: of two displacements, of a deflection that is a state of its own.
 
-use hysid_plant::{Expr, Simulation, State};
+use hysid_plant::{BinaryOp, Expr, Simulation, State};
 
 use super::algebra::{coefficient, constant_coefficient, linear_coefficient, only_parameters, quotient, unless_one};
 use super::find::Finder;
@@ -100,14 +100,16 @@ impl Finder<'_> {
             let (other, first) = felt.first()?;
             // The force is that of the deflection's own equation, or the one that the first of the others feels where its own holds several shares of it.
             let unit = if let [own] = &own[..] { own.clone() } else { -first.clone() };
+            let of_unit = |spring: &Expr| quotient(spring.clone(), unit.clone());
+            let cancelled = |share: &Expr| !unit.symbols().iter().any(|s| share.uses(s));
             let share = |springs: &[Expr]| {
-                let (negative, shares): (Vec<bool>, Vec<Expr>) =
-                    springs.iter().map(|s| quotient(s.clone(), unit.clone())).map(signed).unzip();
+                let (negative, shares): (Vec<bool>, Vec<Expr>) = springs.iter().map(of_unit).map(signed).unzip();
                 let one_way = negative.iter().all(|n| *n == negative[0]);
                 let whole = shares.into_iter().reduce(|a, b| a + b)?;
-                let cancelled = !unit.symbols().iter().any(|s| whole.uses(s));
-                (one_way && cancelled).then(|| (if negative[0] { -1.0 } else { 1.0 }, unless_one(whole)))
+                (one_way && cancelled(&whole)).then(|| (if negative[0] { -1.0 } else { 1.0 }, unless_one(whole)))
             };
+            // Another spring may be at the same coordinate: the tyre under a suspension.
+            let own: Vec<Expr> = own.iter().filter(|spring| cancelled(&of_unit(spring))).cloned().collect();
             let (_, lever) = share(&own).filter(|(sign, _)| *sign > 0.0)?;
             let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.state, 1.0) }];
             for (other, there) in &felt {
@@ -122,7 +124,9 @@ impl Finder<'_> {
                 other: Some(other),
                 words: format!("in {x}, which pulls at {} coordinates", pulls.len()),
             };
-            Some(Slot { target: Target::Derivatives(pulls), ..self.connection(one, stretch) })
+            let mut slot = Slot { target: Target::Derivatives(pulls), ..self.connection(one, stretch) };
+            slot.offer(self.simulation, "k", (-unit).simplified());
+            Some(slot)
         };
         self.motions.iter().filter_map(element).collect()
     }
@@ -132,8 +136,16 @@ impl Finder<'_> {
     fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
         let terms = forces_of(self.simulation, part).filter(|(_, t)| t.uses(x));
         let all: Vec<Expr> = terms
+            .flat_map(|(sign, term)| match term {
+                // A sum that is divided as a whole may hold several springs.
+                Expr::Binary(BinaryOp::Div, sum, by) => {
+                    let each = sum.terms().into_iter();
+                    each.map(|(own, t)| (sign * own, t.clone() / (**by).clone())).collect()
+                }
+                _ => vec![(sign, term.clone())],
+            })
             .filter_map(|(sign, term)| {
-                let rate = linear_coefficient(self.simulation, term, x)?;
+                let rate = linear_coefficient(self.simulation, &term, x)?;
                 Some(if sign < 0.0 { -rate } else { rate })
             })
             .collect();
@@ -263,7 +275,7 @@ pub(super) mod tests {
             .collect();
         let text = format!(
             "[time]\nperiod_s = 0.01\n[inputs]\nu = \"{column}\"\n[parameters]\nJ = {{ value = 2.0, min = 0.1 }}\nk = {{ value = 50.0, min = 1.0 }}\n\
-             c = {{ value = 0.3, min = 0.0 }}\nn = {{ value = 4.0, fixed = true }}\n[states]\n{states}[outputs]\nspeed_rad_s = \"w2\"\n"
+             c = {{ value = 0.3, min = 0.0 }}\nn = {{ value = 4.0, fixed = true }}\np = {{ value = 90.0, min = 1.0 }}\n[states]\n{states}[outputs]\nspeed_rad_s = \"w2\"\n"
         );
         let simulation = Simulation::parse(&text, "test.sim.toml").unwrap();
         Structure::of(&simulation).slots.into_iter().filter(|s| s.place == place).collect()
@@ -313,7 +325,16 @@ pub(super) mod tests {
             ("w2", "-(k*d + c*w2)/n - (u - n*q1 + k*d + c*w2)/J", "m/s"),
         ];
         let found = slots(Place::Connection, &relative);
-        assert_eq!(found, [["d", "w2", "-((-k/n - k/J)/(1/n + 1/J))", "-(1/n + 1/J)*w2 +w1"].map(str::to_owned)]);
+        assert_eq!(found, [["d", "w2", "k", "-(1/n + 1/J)*w2 +w1"].map(str::to_owned)]);
+        // A suspension over its own deflection, above a tyre.
+        let suspended = [
+            ("q1", "w1", "m"),
+            ("w1", "(k*d + c*w2)/J", "m/s"),
+            ("d", "w2", "m"),
+            ("w2", "(p*(u - q1 - d) - k*d - c*w2)/n - (k*d + c*w2)/J", "m/s"),
+        ];
+        let found = slots(Place::Connection, &suspended);
+        assert_eq!(found, [["d", "w2", "k", "-(1/n + 1/J)*w2 +w1"].map(str::to_owned)]);
         // A first effect in an element leaves the second its place.
         let stiffened = [
             drifts[0],

@@ -1,6 +1,6 @@
 //! A store that loses what it holds.
 
-use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose};
+use crate::mechanism::{Amplitudes, Block, Family, Form, Grid, Law, Mechanism, Need, Purpose};
 use crate::slot::Place;
 
 /// A store that loses what it holds.
@@ -14,22 +14,27 @@ pub static LEAKAGE: Mechanism = Mechanism {
     law: |slot, purpose| {
         // A loss in proportion would be a change of a parameter where the baseline has one, and one through an opening where what leaves through one is lost.
         let opening = (slot.has("k") || slot.feeds_another()) && !slot.is_electrical();
-        let other = purpose == Purpose::Form(Form::Other) && !slot.has("k") && !slot.is_electrical();
-        if opening != other {
-            // Torricelli's law; the reference level keeps the unit of q_l that of a flow.
-            Law::outflow("q_l*sqrt(max(s, 0)/s_r)").amplitude("q_l", "F", 0.0, 2.0).constant(
-                "s_r",
-                "s",
-                Grid::Reach("s", vec![1.0]),
-            )
-        } else {
-            Law::outflow("q_l*s/s_r").amplitude("q_l", "F", 0.0, 2.0).constant("s_r", "s", Grid::Reach("s", vec![1.0]))
-        }
+        let both = !slot.has("k") && !slot.is_electrical();
+        // Torricelli's law; the reference level keeps the unit of the amplitude that of a flow.
+        let part = |opening: bool, name: &str| {
+            let level = if opening { "sqrt(max(s, 0)/s_r)" } else { "s/s_r" };
+            format!("{name}*{level}")
+        };
+        let parts = match purpose {
+            // A free area may take up all that an opening loses, and nothing that is lost in proportion.
+            Purpose::Screening if both => vec![(opening, "q_l"), (!opening, "q_o")],
+            Purpose::Form(Form::Other) if both => vec![(!opening, "q_o")],
+            _ => vec![(opening, "q_l")],
+        };
+        let sum: Vec<String> = parts.iter().map(|(opening, name)| part(*opening, name)).collect();
+        let law = Law::outflow(sum.join(" + ")).with_amplitudes(Amplitudes::Apart);
+        let law = parts.iter().fold(law, |law, (_, name)| law.amplitude(*name, "F", 0.0, 2.0));
+        law.constant("s_r", "s", Grid::Reach("s", vec![1.0]))
     },
     contains: &[],
     confusable: &["overflow", "input_offset"],
     needs: &[Need::Levels("s", 1.2)],
-    sentence: "The store {place} leaks {q_l} at {s_r}; the simulation keeps what it has.",
+    sentence: "The store {place} leaks[ {q_l} at {s_r}][ {q_o} at {s_r}]; the simulation keeps what it has.",
     signature: "It drains faster than the simulation, more so when full.",
     reference: "M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noël, Cascaded tanks benchmark combining soft and hard nonlinearities, Workshop on Nonlinear System Identification Benchmarks (2016)",
 };
@@ -56,6 +61,13 @@ mod tests {
         for (label, first) in [("state:h1", true), ("state:h2", false)] {
             assert_eq!(law(label, Purpose::Refit).contains("sqrt"), first, "{label}");
             assert_eq!(law(label, Purpose::Form(Form::Other)).contains("sqrt"), !first, "{label}");
+            // Both are looked for, and that which explains more is fitted first.
+            assert!(
+                law(label, Purpose::Screening).contains("sqrt") && law(label, Purpose::Screening).contains("s/s_r")
+            );
+            let slot = slots.iter().find(|s| s.label == label).unwrap();
+            let fitted = |name: &str| LEAKAGE.fitted_first(slot, &[(name.to_owned(), 1.0)]);
+            assert_eq!(["q_l", "q_o"].map(fitted), [Purpose::Refit, Purpose::Form(Form::Other)]);
         }
     }
 
