@@ -32,20 +32,26 @@ impl Finder<'_> {
             _ => return None,
         };
         let Target::Derivatives(pulls) = &slot.target else { return None };
-        let state = &pulls.first()?.state;
-        let motion = self.motions.iter().find(|m| m.state == state)?;
-        let held = self.forces_on(motion, connects).or_else(|| self.force_of_deflection(slot, motion))?;
-        let (scale, held) = peeled(&held);
+        // What a gear passes on is measured before it or behind it.
+        let ends = pulls.iter().filter_map(|pull| self.motions.iter().find(|m| m.state == pull.state));
+        let held: Vec<(&str, f64, Expr)> = ends
+            .flat_map(|motion| {
+                let deflection = if connects { self.force_of_deflection(slot, motion) } else { None };
+                let held = [self.forces_on(motion, connects), deflection].into_iter().flatten();
+                held.map(|held| peeled(&held)).map(|(scale, held)| (motion.state, scale, held))
+            })
+            .collect();
         let cell = |output: &Output| {
             let (factor, inner) = peeled(&output.expression);
             let is_force = Unit::of_column(&output.column).is_none_or(|u| presses(&u));
-            if !is_force || slot.sensed.iter().any(|s| s.column == output.column) || !shares(simulation, &inner, &held)
-            {
+            if !is_force || slot.sensed.iter().any(|s| s.column == output.column) {
                 return None;
             }
-            let times = factor / scale * multiple(simulation, &inner, &held, true)?;
-            let column = output.column.clone();
-            is_power_of_ten(times, 1.0).then(|| Sensed { felt: Felt::Force, state: state.clone(), column, times })
+            held.iter().filter(|(_, _, held)| shares(simulation, &inner, held)).find_map(|(state, scale, held)| {
+                let times = factor / scale * multiple(simulation, &inner, held, true)?;
+                let (state, column) = ((*state).to_owned(), output.column.clone());
+                is_power_of_ten(times, 1.0).then_some(Sensed { felt: Felt::Force, state, column, times })
+            })
         };
         let cells: Vec<Sensed> = simulation.outputs.iter().filter_map(cell).collect();
         let columns: Vec<&str> = cells.iter().map(|c| c.column.as_str()).collect();
@@ -64,7 +70,7 @@ mod tests {
 
     use crate::mechanism::conformance::example_signals;
     use crate::mechanism::{Purpose, mechanism};
-    use crate::slot::Structure;
+    use crate::slot::{Place, Slot, Structure};
 
     fn caliper(cell: &str) -> Simulation {
         let text = format!(
@@ -84,7 +90,7 @@ mod tests {
             [outputs]\nload_m_s2 = \"(k*e + c*(u - v))/m\"\ncable_N = \"k*e\"\n";
         let simulation = Simulation::parse(text, "hoist.sim.toml").unwrap();
         let spring = mechanism("quadratic_stiffness").unwrap();
-        let written = |slot: &crate::slot::Slot| {
+        let written = |slot: &Slot| {
             let signals = example_signals(&simulation, slot);
             let written = spring.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap().simulation;
             written.outputs.iter().map(|o| o.expression.to_string()).collect::<Vec<_>>()
@@ -94,6 +100,27 @@ mod tests {
             slots.iter().any(|s| written(s)[1] == "k*e - k_2*(-e)^2"),
             "{:?}",
             slots.iter().map(written).collect::<Vec<_>>()
+        );
+    }
+
+    #[test]
+    fn the_torque_behind_a_gear_is_that_of_its_shaft() {
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nu = \"motor_Nm\"\n[parameters]\nk = { value = 25.0, min = 1.0, unit = \"N m/rad\" }\n\
+            c = { value = 0.1, min = 0.01, unit = \"N m s/rad\" }\nn = { value = 80.0, fixed = true }\nJ = { value = 2.0, min = 0.1, unit = \"kg m^2\" }\n\
+            [states]\nq1 = { derivative = \"w1\", initial = 0.0, unit = \"rad\" }\nw1 = { derivative = \"(u - (k*(q1/n - q2) + c*(w1/n - w2))/n)/J\", initial = 0.0, unit = \"rad/s\" }\n\
+            q2 = { derivative = \"w2\", initial = 0.0, unit = \"rad\" }\nw2 = { derivative = \"(k*(q1/n - q2) + c*(w1/n - w2))/J\", initial = 0.0, unit = \"rad/s\" }\n\
+            [outputs]\nq2_rad = \"q2\"\nshaft_Nm = \"k*(q1/n - q2) + c*(w1/n - w2)\"\n";
+        let simulation = Simulation::parse(text, "joint.sim.toml").unwrap();
+        let spring = mechanism("quadratic_stiffness").unwrap();
+        let felt = |slot: &Slot| slot.place == Place::Connection && !slot.sensed.is_empty();
+        let slots = spring.slots(&Structure::of(&simulation));
+        let slot = slots.iter().find(|s| felt(s)).unwrap();
+        let signals = example_signals(&simulation, slot);
+        let written = spring.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap().simulation;
+        assert!(
+            written.outputs[1].expression.to_string().ends_with(" + k_2*(1/n*q1 - q2)^2"),
+            "{}",
+            written.outputs[1].expression
         );
     }
 
