@@ -11,6 +11,9 @@ const LEAST_TAIL: f64 = 1e-200;
 /// Share of a direction's power outside others below which what is left is rounding and curvature.
 const LEAST_LEFT: f64 = 1e-3;
 
+/// An effect that acts where there is next to no noise is seen by other samples too.
+const LEAST_INFLATION: f64 = 0.05;
+
 /// The response of one effect at one shape: whitened, projected, orthonormalised.
 #[derive(Debug, Clone)]
 pub struct FeatureGroup {
@@ -79,6 +82,16 @@ impl FeatureGroup {
     /// Sum of squares of `r` along the columns.
     pub fn explained(&self, r: &[f64]) -> f64 {
         self.columns.iter().map(|g| dot(g, r).powi(2)).sum()
+    }
+
+    /// What `r` with the sign of each sample drawn has along the columns in the mean, over what as much noise of one size has; at least [`LEAST_INFLATION`].
+    ///
+    /// Reference: H. White, Econometrica 48 (1980) 817-838.
+    pub fn inflation(&self, r: &[f64]) -> f64 {
+        let at = |g: &Vec<f64>| g.iter().zip(r).map(|(g, r)| (g * r).powi(2)).sum::<f64>();
+        let mean: f64 = self.columns.iter().map(at).sum();
+        let even = norm2(r) * self.columns.len() as f64 / r.len().max(1) as f64;
+        if even > 0.0 { (mean / even).max(LEAST_INFLATION) } else { 1.0 }
     }
 
     /// Takes the part of `r` along the columns out of it.

@@ -1,6 +1,7 @@
 //! Whole diagnoses of an oscillator whose recordings come from a small integrator of the tests' own, and bad input.
 
 mod actuator;
+mod coil;
 mod held;
 mod oscillator;
 mod rotor;

@@ -10,8 +10,8 @@
 //! tower over their neighbours (an offset, a periodic effect) do not raise the median, noise that rises towards low frequency does.
 //!
 //! Noise that is large where an effect is (a sensor's that grows with its reading) leaves the effect few samples, among which much fits by chance; rolled away
-//! it does no such thing. Where it matters, a mismatch must also stand out from what the best effect leaves with the sign of each sample drawn, which stays where
-//! it is (C. F. J. Wu, Annals of Statistics 14 (1986) 1261-1295, the wild bootstrap).
+//! it does no such thing. Where that matters to what the best effect leaves, a mismatch must also stand out from the residual with the sign of each sample drawn, which stays where
+//! it is, where what each effect explains is measured by what noise of these sizes would let it explain (C. F. J. Wu, Annals of Statistics 14 (1986) 1261-1295, the wild bootstrap).
 //!
 //! The features must come from *simulated* trajectories: measured ones carry the noise of the residual into the feature.
 
@@ -90,13 +90,20 @@ pub fn correlation_time(layout: &Layout, r: &[f64]) -> usize {
 /// Surrogates that are scored together: the groups' columns are far more than a cache holds, and each is read once for all of them.
 const TOGETHER: usize = 8;
 
-/// The largest score over the groups less their handicaps, with the group, of each of these residuals.
-fn largest(groups: &[Contender<'_>], residuals: &[Vec<f64>], own: &Projector) -> Vec<(f64, Option<usize>)> {
+/// The largest score over the groups less their handicaps, with the group, of each of these residuals; what a group explains is divided by its `inflation`
+/// where there is one.
+fn largest(
+    groups: &[Contender<'_>],
+    residuals: &[Vec<f64>],
+    own: &Projector,
+    inflation: &[f64],
+) -> Vec<(f64, Option<usize>)> {
     let mut best: Vec<(f64, Option<usize>)> = vec![(f64::NEG_INFINITY, None); residuals.len()];
     let totals: Vec<f64> = residuals.iter().map(|r| norm2(r) - own.inside(r)).collect();
     for (i, g) in groups.iter().enumerate() {
         for ((r, total), best) in residuals.iter().zip(&totals).zip(&mut best) {
-            let s = score(*total, g.group.explained(r), r.len(), g.group.columns.len()) - g.handicap;
+            let explained = g.group.explained(r) / inflation.get(i).unwrap_or(&1.0);
+            let s = score(*total, explained, r.len(), g.group.columns.len()) - g.handicap;
             if s > best.0 {
                 *best = (s, Some(i));
             }
@@ -116,41 +123,50 @@ pub fn surrogate_test(
     r: &[f64],
     options: TestOptions,
 ) -> SurrogateTest {
-    let (statistic, best) = largest(groups, &[r.to_vec()], own).pop().unwrap_or((f64::NEG_INFINITY, None));
+    let largest_on = |r: &[f64], inflation: &[f64]| {
+        largest(groups, &[r.to_vec()], own, inflation).pop().unwrap_or((f64::NEG_INFINITY, None))
+    };
+    let (statistic, best) = largest_on(r, &[]);
     if groups.is_empty() {
         return SurrogateTest { p_value: 1.0, statistic: 0.0, best: None, surrogates: Vec::new(), unequal: false };
     }
     let tau = correlation_time(layout, r);
     let fairly: Vec<Contender<'_>> = groups.iter().map(|g| Contender { handicap: 0.0, ..*g }).collect();
-    let scores = |some: Range<u64>, one: &dyn Fn(u64) -> Vec<f64>| -> Vec<f64> {
+    let scores = |some: Range<u64>, inflation: &[f64], one: &dyn Fn(u64) -> Vec<f64>| -> Vec<f64> {
         let drawn: Vec<Vec<f64>> = some.map(one).collect();
-        largest(&fairly, &drawn, own).into_iter().map(|l| l.0).collect()
+        largest(&fairly, &drawn, own, inflation).into_iter().map(|l| l.0).collect()
     };
     let outside = |mut x: Vec<f64>| {
         own.remove(&mut x);
         x
     };
-    let bar = statistic - MARGIN;
-    let unrelated = |some: Range<u64>| scores(some, &|b| rolled(layout, r, tau, options.seed, b));
-    let judged = |scores: Vec<f64>| (exceeded(&scores, bar), scores);
-    let first = judged(draw(&unrelated, bar, options.alpha));
+    let judged = |statistic: f64, some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync)| {
+        let bar = statistic - MARGIN;
+        let scores = draw(some, bar, options.alpha);
+        (exceeded(&scores, bar), scores)
+    };
+    let first = judged(statistic, &|some| scores(some, &[], &|b| rolled(layout, r, tau, options.seed, b)));
+    let in_place = |of: &[f64], some: Range<u64>, inflation: &[f64]| {
+        scores(some, inflation, &|b| outside(flipped(layout, of, options.seed, b)))
+    };
     let mut left = r.to_vec();
     best.iter().for_each(|&best| groups[best].group.remove(&mut left));
-    let in_place = |some: Range<u64>| scores(some, &|b| outside(flipped(layout, &left, options.seed, b)));
-    let few = (0..IN_PLACE).step_by(TOGETHER).flat_map(|b| in_place(b as u64..(b + TOGETHER) as u64));
+    let few = (0..IN_PLACE).step_by(TOGETHER).flat_map(|b| in_place(&left, b as u64..(b + TOGETHER) as u64, &[]));
     let unequal = median(few.collect()) > median(first.1.clone()) + UNEQUAL;
     let mut kinds = Vec::new();
     if first.0 <= options.alpha {
         let levels: Vec<Vec<f64>> = layout.series.iter().map(|s| levels(&r[s.rows.clone()])).collect();
-        let like_it =
-            |some: Range<u64>| scores(some, &|b| outside(gaussian(layout, &levels, r.len(), options.seed, b)));
-        kinds.push(judged(draw(&like_it, bar, options.alpha)));
+        let one = |b| outside(gaussian(layout, &levels, r.len(), options.seed, b));
+        kinds.push(judged(statistic, &|some| scores(some, &[], &one)));
     }
     if unequal {
-        kinds.push(judged(draw(&in_place, bar, options.alpha)));
+        // The best effect may have taken the largest errors out of what it leaves.
+        let inflation: Vec<f64> = groups.iter().map(|g| g.group.inflation(r)).collect();
+        let (statistic, _) = largest_on(r, &inflation);
+        kinds.push(judged(statistic, &|some| in_place(r, some, &inflation)));
     }
-    let largest = kinds.into_iter().fold(first, |known, other| if other.0 > known.0 { other } else { known });
-    let (p_value, surrogates) = largest;
+    let (p_value, surrogates) =
+        kinds.into_iter().fold(first, |known, other| if other.0 > known.0 { other } else { known });
     SurrogateTest { p_value, statistic, best, surrogates, unequal }
 }
 
