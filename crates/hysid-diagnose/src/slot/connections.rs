@@ -133,7 +133,7 @@ impl Finder<'_> {
 
     /// What a deflection pulls with for each unit of it, in each term of the force on a part that is linear in it; `None` where there is none. Another
     /// term may be what a first effect has put there.
-    fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
+    pub(super) fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
         let terms = forces_of(self.simulation, part).filter(|(_, t)| t.uses(x));
         let all: Vec<Expr> = terms
             .flat_map(|(sign, term)| match term {

@@ -6,7 +6,7 @@ use super::Slot;
 use super::algebra::{constant_coefficient, quotient, unless_one};
 use super::connections::{Stretch, forces_of, is_negative};
 use super::find::Finder;
-use super::motion::{Kinematic, Motion};
+use super::motion::{Kinematic, Motion, force_of, kinematic};
 
 impl Finder<'_> {
     /// Connections with a motion that an input prescribes: a force that holds a velocity and the rate of the input together, or a spring between the two. A
@@ -62,7 +62,13 @@ impl Finder<'_> {
         };
         let other = constant_coefficient(self.simulation, &ground, input)?;
         let only = |s: &String| s == one.v || s == input || s == "pi" || self.simulation.parameter(s).is_some();
-        if !moves || is_negative(&own) == is_negative(&other) || !symbols.iter().all(only) {
+        // The integral of a controller's error is as long as a deflection; its gain is known, a spring's rate is not.
+        let length = kinematic(self.simulation.unit_of(name).as_ref(), name) == Kinematic::Displacement;
+        let rates = self.springs(one, name)?;
+        if !(moves && length && rates.iter().all(|rate| self.is_estimated(rate, one)))
+            || is_negative(&own) == is_negative(&other)
+            || !symbols.iter().all(only)
+        {
             return None;
         }
         // The part's own motion counts positively.
@@ -78,6 +84,13 @@ impl Finder<'_> {
         Some(self.connection(one, stretch))
     }
 
+    /// Whether a parameter in the rate of a spring at a part is not known, but for the mass by which all its forces are divided.
+    fn is_estimated(&self, rate: &Expr, part: &Motion<'_>) -> bool {
+        let (_, mass) = force_of(self.simulation, part.derivative);
+        let open = |s: &String| self.simulation.parameter(s).is_some_and(|p| !p.fixed);
+        rate.symbols().iter().any(|s| open(s) && !mass.is_some_and(|mass| mass.uses(s)))
+    }
+
     /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too: `0.001` of a road in mm.
     fn travel(&self, one: &Motion<'_>, x: &str, input: &str) -> Option<Expr> {
         // The rate of an acceleration balances no forces: what stands there is a servo's.
@@ -87,10 +100,8 @@ impl Finder<'_> {
         forces_of(self.simulation, one).find_map(|(_, term)| {
             let [held, given] = [x, input].map(|s| constant_coefficient(self.simulation, term, s));
             let (held, given) = (held?, given?);
-            let estimated = |s: &String| self.simulation.parameter(s).is_some_and(|p| !p.fixed);
             let scale = quotient(-given, held.clone());
-            (held.symbols().iter().any(estimated) && scale.symbols().is_empty() && !is_negative(&scale))
-                .then_some(scale)
+            (self.is_estimated(&held, one) && scale.symbols().is_empty() && !is_negative(&scale)).then_some(scale)
         })
     }
 }
@@ -113,6 +124,9 @@ mod tests {
         check("drum_m", "u - w2", "k*z/J", None);
         check("pull_N", "u - w2", "k*z/J", None);
         check("drum_m_s", "u + w2", "-k*z/J", None);
+        // A velocity loop with a known gain.
+        check("ref_m_s", "u - w2", "(n*z + c*(u - w2))/J", None);
+        check("ref_m_s", "u - w2", "n*z/J + c*(u - w2)/J", None);
     }
 
     #[test]

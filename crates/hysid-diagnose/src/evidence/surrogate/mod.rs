@@ -115,7 +115,7 @@ fn largest(
 /// Tests whether the whitened residual `r`, already projected off `own`, is related to any of the groups.
 ///
 /// Surrogates are drawn in batches: a clear answer ends after 199, a close one goes on to `4/alpha` (at least 999). The p-value is the
-/// larger one of the two kinds of surrogate; the second kind is drawn only where the first is exceeded.
+/// largest one of the kinds of surrogate; the second kind is drawn only where the first is exceeded, and the third where it matters where the residual is large.
 pub fn surrogate_test(
     groups: &[Contender<'_>],
     layout: &Layout,

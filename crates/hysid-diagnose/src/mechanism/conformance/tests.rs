@@ -277,7 +277,7 @@ fn a_store_may_leak_in_proportion_or_through_an_opening() {
         for (slot, signals) in bench.slots(leakage).into_iter().filter(|(slot, _)| !slot.has("k")) {
             let outflow = |purpose| {
                 let written = leakage.rewrite(&bench.simulation, &slot, &signals, purpose).unwrap().simulation;
-                written.expressions().iter().any(|(_, e)| e.to_string().contains("q_l*sqrt(max("))
+                written.expressions().iter().any(|(_, e)| e.to_string().contains("*sqrt(max("))
             };
             assert!(outflow(Purpose::Form(Form::Other)) && !outflow(Purpose::Refit), "{slot}");
             seen += 1;
