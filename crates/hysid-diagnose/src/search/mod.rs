@@ -308,7 +308,8 @@ impl<'a, 'd> Search<'a, 'd> {
             some.flat_map(|c| c.points.iter().filter_map(|p| p.group.as_ref()))
         };
         let layout = &base.model.data().layout;
-        let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed };
+        let may_be_noise = !(base.coloured() || base.gross() || base.far());
+        let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed, may_be_noise };
         if !base.whitener.models.iter().all(NoiseModel::is_known_below) {
             let drifts = Projector::new(groups_of(true).flat_map(|g| g.columns.iter().cloned()));
             let rest: Vec<FeatureGroup> = groups_of(false).filter_map(|g| g.outside(&drifts)).collect();
