@@ -95,9 +95,7 @@ fn arithmetic(largest: f64) -> f64 {
 
 /// Where the clock first leaves the median step, so that the message points at the row at fault and not at the farthest one.
 fn uneven(t: &[f64], rough: f64, allowed: f64) -> (usize, InputProblem) {
-    let mut steps: Vec<f64> = t.windows(2).map(|p| p[1] - p[0]).collect();
-    let middle = steps.len() / 2;
-    let period = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let period = hysid_signal::median(t.windows(2).map(|p| p[1] - p[0]).collect());
     let jump = t.windows(2).position(|p| (p[1] - p[0] - period).abs() > 2.0 * allowed.min(0.4 * period));
     let n = match jump {
         Some(k) => k + 1,

@@ -21,6 +21,14 @@ pub fn norm2(a: &[f64]) -> f64 {
     dot(a, a)
 }
 
+/// Takes the part along orthonormal columns out of `x`.
+pub fn remove_along(columns: &[Vec<f64>], x: &mut [f64]) {
+    for q in columns {
+        let c = dot(q, x);
+        x.iter_mut().zip(q).for_each(|(x, q)| *x -= c * q);
+    }
+}
+
 /// An orthonormal basis and the projection off it.
 #[derive(Debug, Clone, Default)]
 pub struct Projector {
@@ -70,12 +78,7 @@ impl Projector {
     /// Projects in place: twice, so that rounding cannot leave a visible part inside the span.
     pub fn remove(&self, x: &mut [f64]) {
         for _ in 0..2 {
-            for q in &self.basis {
-                let c = dot(q, x);
-                for (x, q) in x.iter_mut().zip(q) {
-                    *x -= c * q;
-                }
-            }
+            remove_along(&self.basis, x);
         }
     }
 

@@ -94,14 +94,6 @@ impl FeatureGroup {
         if even > 0.0 { (mean / even).max(LEAST_INFLATION) } else { 1.0 }
     }
 
-    /// Takes the part of `r` along the columns out of it.
-    pub fn remove(&self, r: &mut [f64]) {
-        for g in &self.columns {
-            let c = dot(g, r);
-            r.iter_mut().zip(g).for_each(|(r, g)| *r -= c * g);
-        }
-    }
-
     /// The amplitudes of the `count` responses that explain `r` best; zero for responses without a column of their own.
     pub fn amplitudes(&self, r: &[f64], count: usize) -> Vec<f64> {
         let mut right: Vec<f64> = self.columns.iter().map(|g| dot(g, r)).collect();

@@ -82,6 +82,18 @@ mod tests {
         Simulation::parse(&text, "caliper.sim.toml").unwrap()
     }
 
+    /// The slots of a curved spring, each with what the output of this number is with the spring there.
+    fn sprung(simulation: &Simulation, output: usize) -> Vec<(Slot, String)> {
+        let spring = mechanism("quadratic_stiffness").unwrap();
+        let written = |slot: Slot| {
+            let signals = example_signals(simulation, &slot);
+            let written = spring.rewrite(simulation, &slot, &signals, Purpose::Refit).unwrap().simulation;
+            let read = written.outputs[output].expression.to_string();
+            (slot, read)
+        };
+        spring.slots(&Structure::of(simulation)).into_iter().map(written).collect()
+    }
+
     #[test]
     fn what_a_cable_pulls_with_is_measured_where_it_is_all_that_its_stretch_does() {
         let text = "[time]\nperiod_s = 0.01\n[inputs]\nu = \"drum_m_s\"\n[parameters]\nk = { value = 25.0, min = 1.0, unit = \"N/m\" }\n\
@@ -89,18 +101,8 @@ mod tests {
             [states]\ne = { derivative = \"u - v\", initial = 0.0, unit = \"m\" }\nv = { derivative = \"(k*e + c*(u - v))/m\", initial = 0.0, unit = \"m/s\" }\n\
             [outputs]\nload_m_s2 = \"(k*e + c*(u - v))/m\"\ncable_N = \"k*e\"\n";
         let simulation = Simulation::parse(text, "hoist.sim.toml").unwrap();
-        let spring = mechanism("quadratic_stiffness").unwrap();
-        let written = |slot: &Slot| {
-            let signals = example_signals(&simulation, slot);
-            let written = spring.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap().simulation;
-            written.outputs.iter().map(|o| o.expression.to_string()).collect::<Vec<_>>()
-        };
-        let slots = spring.slots(&Structure::of(&simulation));
-        assert!(
-            slots.iter().any(|s| written(s)[1] == "k*e - k_2*(-e)^2"),
-            "{:?}",
-            slots.iter().map(written).collect::<Vec<_>>()
-        );
+        let found = sprung(&simulation, 1);
+        assert!(found.iter().any(|(_, read)| read == "k*e - k_2*(-e)^2"), "{found:?}");
     }
 
     #[test]
@@ -111,32 +113,14 @@ mod tests {
             q2 = { derivative = \"w2\", initial = 0.0, unit = \"rad\" }\nw2 = { derivative = \"(k*(q1/n - q2) + c*(w1/n - w2))/J\", initial = 0.0, unit = \"rad/s\" }\n\
             [outputs]\nq2_rad = \"q2\"\nshaft_Nm = \"k*(q1/n - q2) + c*(w1/n - w2)\"\n";
         let simulation = Simulation::parse(text, "joint.sim.toml").unwrap();
-        let spring = mechanism("quadratic_stiffness").unwrap();
         let felt = |slot: &Slot| slot.place == Place::Connection && !slot.sensed.is_empty();
-        let slots = spring.slots(&Structure::of(&simulation));
-        let slot = slots.iter().find(|s| felt(s)).unwrap();
-        let signals = example_signals(&simulation, slot);
-        let written = spring.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap().simulation;
-        assert!(
-            written.outputs[1].expression.to_string().ends_with(" + k_2*(1/n*q1 - q2)^2"),
-            "{}",
-            written.outputs[1].expression
-        );
+        let (_, read) = sprung(&simulation, 1).into_iter().find(|(slot, _)| felt(slot)).unwrap();
+        assert!(read.ends_with(" + k_2*(1/n*q1 - q2)^2"), "{read}");
     }
 
     #[test]
     fn what_a_load_cell_feels_is_written_into_it() {
-        let written = |cell: &str| {
-            let simulation = caliper(cell);
-            let spring = mechanism("quadratic_stiffness").unwrap();
-            let slots = spring.slots(&Structure::of(&simulation));
-            let forms = slots.iter().map(|slot| {
-                let signals = example_signals(&simulation, slot);
-                let written = spring.rewrite(&simulation, slot, &signals, Purpose::Refit).unwrap();
-                written.simulation.outputs[0].expression.to_string()
-            });
-            forms.collect::<Vec<_>>()
-        };
+        let written = |cell: &str| sprung(&caliper(cell), 0).into_iter().map(|(_, read)| read).collect::<Vec<_>>();
         assert_eq!(written("k*x + c*v"), ["k*x + c*v", "k*x + c*v + k_2*x^2"]);
         assert_eq!(written("-1000*(k*x + c*v)"), ["-1000*(k*x + c*v)", "-1000*(k*x + c*v) - 1000*(k_2*x^2)"]);
         // What measures a part of that is no load cell.

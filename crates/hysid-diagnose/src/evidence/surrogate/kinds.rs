@@ -1,6 +1,6 @@
 //! The kinds of surrogates of a whitened residual.
 
-use hysid_signal::{fourier, inverse_fourier};
+use hysid_signal::{fourier, inverse_fourier, median};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -40,38 +40,41 @@ fn sign(rng: &mut impl RngExt) -> f64 {
     if rng.random::<bool>() { 1.0 } else { -1.0 }
 }
 
-/// `r`, rolled with the signs of its blocks drawn. Outputs of one run are moved together: noise that acts inside the machine is in all of them, and an effect that acts there
-/// finds it in all of them.
-pub fn rolled(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> Vec<f64> {
-    let mut rng = generator(seed, 0x5u64 << 56 | index);
+/// `r` with each series moved by what is drawn for it. Outputs of one run are moved together: noise that acts inside the machine is in all of them, and an effect
+/// that acts there finds it in all of them.
+fn moved<M>(
+    layout: &Layout,
+    r: &[f64],
+    mut draw: impl FnMut(&Series) -> M,
+    of: impl Fn(&M, &[f64], &mut [f64]),
+) -> Vec<f64> {
     let mut out = vec![0.0; r.len()];
-    let mut moves: Vec<(&Series, Moves)> = Vec::new();
+    let mut drawn: Vec<(&Series, M)> = Vec::new();
     for s in &layout.series {
-        let known = moves.iter().position(|(of, _)| of.is_beside(s));
+        let known = drawn.iter().position(|(of, _)| of.is_beside(s));
         let place = known.unwrap_or_else(|| {
-            moves.push((s, Moves::drawn(s.rows.len(), tau, &mut rng)));
-            moves.len() - 1
+            drawn.push((s, draw(s)));
+            drawn.len() - 1
         });
-        let moved = moves[place].1.of(&r[s.rows.clone()]);
-        out[s.rows.clone()].iter_mut().zip(moved).for_each(|(o, v)| *o = v);
+        of(&drawn[place].1, &r[s.rows.clone()], &mut out[s.rows.clone()]);
     }
     out
 }
 
-/// `r` with the sign of each sample drawn, the same for all outputs of a run: what is large stays where it is.
+/// `r`, rolled with the signs of its blocks drawn.
+pub fn rolled(layout: &Layout, r: &[f64], tau: usize, seed: u64, index: u64) -> Vec<f64> {
+    let mut rng = generator(seed, 0x5u64 << 56 | index);
+    let draw = |s: &Series| Moves::drawn(s.rows.len(), tau, &mut rng);
+    moved(layout, r, draw, |moves, x, out| out.iter_mut().zip(moves.of(x)).for_each(|(o, v)| *o = v))
+}
+
+/// `r` with the sign of each sample drawn: what is large stays where it is.
 pub fn flipped(layout: &Layout, r: &[f64], seed: u64, index: u64) -> Vec<f64> {
     let mut rng = generator(seed, 0x7u64 << 56 | index);
-    let mut out = r.to_vec();
-    let mut known: Vec<(&Series, Vec<f64>)> = Vec::new();
-    for s in &layout.series {
-        let beside = known.iter().position(|(of, _)| of.is_beside(s));
-        let place = beside.unwrap_or_else(|| {
-            known.push((s, s.rows.clone().map(|_| sign(&mut rng)).collect()));
-            known.len() - 1
-        });
-        out[s.rows.clone()].iter_mut().zip(&known[place].1).for_each(|(x, sign)| *x *= sign);
-    }
-    out
+    let draw = |s: &Series| -> Vec<f64> { s.rows.clone().map(|_| sign(&mut rng)).collect() };
+    moved(layout, r, draw, |signs, x, out| {
+        out.iter_mut().zip(x.iter().zip(signs)).for_each(|(o, (x, sign))| *o = x * sign);
+    })
 }
 
 /// The level of each line of a series' spectrum: the median of its neighbours, as wide as a third of the frequency, at least nine lines.
@@ -83,10 +86,9 @@ pub fn levels(x: &[f64]) -> Vec<f64> {
             let half = (k / 3).max(4);
             // The mean is a line of its own kind.
             let window = k.saturating_sub(half).max(1)..=(k + half).min(last);
-            let mut near: Vec<f64> = power.get(window).unwrap_or_default().to_vec();
-            near.sort_by(f64::total_cmp);
+            let near = power.get(window).filter(|near| !near.is_empty());
             // The median of an exponential law is ln 2 of its mean.
-            near.get(near.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
+            near.map_or(0.0, |near| median(near.to_vec())) / std::f64::consts::LN_2
         })
         .collect()
 }

@@ -23,7 +23,7 @@ use hysid_signal::median;
 use rayon::prelude::*;
 
 use super::layout::Layout;
-use super::projector::{Projector, norm2};
+use super::projector::{Projector, norm2, remove_along};
 use super::score::{FeatureGroup, score};
 use kinds::{flipped, gaussian, levels, rolled};
 
@@ -153,9 +153,9 @@ pub fn surrogate_test(
         scores(some, inflation, &|b| outside(flipped(layout, of, options.seed, b)))
     };
     let mut left = r.to_vec();
-    best.iter().for_each(|&best| groups[best].group.remove(&mut left));
-    let few = (0..IN_PLACE).step_by(TOGETHER).flat_map(|b| in_place(&left, b as u64..(b + TOGETHER) as u64, &[]));
-    let unequal = options.may_be_noise && median(few.collect()) > median(first.1.clone()) + UNEQUAL;
+    best.iter().for_each(|&best| remove_along(&groups[best].group.columns, &mut left));
+    let few = || draw_at(0..IN_PLACE, &|some| in_place(&left, some, &[]));
+    let unequal = options.may_be_noise && median(few()) > median(first.1.clone()) + UNEQUAL;
     let mut kinds = Vec::new();
     if first.0 <= options.alpha {
         let levels: Vec<Vec<f64>> = layout.series.iter().map(|s| levels(&r[s.rows.clone()])).collect();
@@ -187,6 +187,14 @@ fn exceeded(scores: &[f64], statistic: f64) -> f64 {
     (1 + scores.iter().filter(|&&v| v >= statistic).count()) as f64 / (1 + scores.len()) as f64
 }
 
+/// Scores of the surrogates of these numbers.
+fn draw_at(numbers: Range<usize>, some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync)) -> Vec<f64> {
+    let end = numbers.end;
+    let blocks: Vec<usize> = numbers.step_by(TOGETHER).collect();
+    let drawn: Vec<Vec<f64>> = blocks.into_par_iter().map(|b| some(b as u64..(b + TOGETHER).min(end) as u64)).collect();
+    drawn.concat()
+}
+
 /// Scores of surrogates, in batches until the answer is clear.
 fn draw(some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync), statistic: f64, alpha: f64) -> Vec<f64> {
     let alpha = alpha.clamp(1e-5, 0.5);
@@ -196,10 +204,7 @@ fn draw(some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync), statistic: f64, alpha: f
     while scores.len() < most {
         let start = scores.len();
         let end = if start == 0 { first } else { (start + 200).min(most) };
-        let blocks: Vec<usize> = (start..end).step_by(TOGETHER).collect();
-        let drawn: Vec<Vec<f64>> =
-            blocks.into_par_iter().map(|b| some(b as u64..(b + TOGETHER).min(end) as u64)).collect();
-        scores.extend(drawn.concat());
+        scores.extend(draw_at(start..end, some));
         let exceeding = scores.iter().filter(|&&v| v >= statistic).count();
         let highest = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if exceeding >= 20 || (exceeding == 0 && statistic > highest + 6.0 && 1.0 / (1 + scores.len()) as f64 <= alpha)
