@@ -308,6 +308,8 @@ fn written<'d>(
         "generic terms explain far more than the effects that were fitted in time; no augmented simulation is written"
     } else if foreign && !vetoed {
         "the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input"
+    } else if file.verdict == VerdictKind::NotInCatalogue && set > 0 && !judged.rest.walks() {
+        "refitted in the equations the sparse correction is no improvement on the effects that were found: the augmented simulation holds those without it"
     } else {
         return Written { set, modelled };
     };

@@ -9,5 +9,6 @@ mod files;
 mod fit;
 mod fuzz_diagnosis;
 mod generate;
+mod recordings;
 mod select;
 mod simulate;

@@ -10,7 +10,7 @@ use crate::file::{CorrectionRecord, RemainingRecord, finite};
 use crate::model::hypothesis::{Hypothesis, block_score};
 use crate::openset::needed::{Refitted, fitted};
 use crate::openset::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
-use crate::search::Search;
+use crate::search::{Search, leaves_more};
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
@@ -116,7 +116,8 @@ impl<'d> Remaining<'d> {
     }
 
     /// The simulation with a sparse correction in its equations, refitted: on top of the winning set, where that is `trusted` on other inputs, or in its
-    /// place, whichever has more evidence. `None` where a parameter walks, and where it predicts blocks that it was not fitted to no better than what would be written `otherwise` (a place in the pool):
+    /// place, whichever has more evidence. `None` where a parameter walks, and where it leaves more error than what would be written `otherwise` (a place in the pool), under a noise model that takes that
+    /// for noise, or predicts blocks that it was not fitted to no better:
     /// three or four blocks tell little of a mismatch far below the noise, so they need not rule out chance where the evidence does.
     pub fn modelled(
         &mut self,
@@ -127,7 +128,7 @@ impl<'d> Remaining<'d> {
         otherwise: usize,
     ) -> Option<Hypothesis<'d>> {
         // Where a parameter walks, another recording sees another walk: functions of the time that follow this one are no use there.
-        if self.told().is_some_and(|o| o.words.is_some() && o.writable.is_none()) {
+        if self.walks() {
             return None;
         }
         let setting = &search.setting;
@@ -150,6 +151,10 @@ impl<'d> Remaining<'d> {
                 (refitted, of.clone(), self.stands_by_evidence(of))
             }
         };
+        let driven = pool[otherwise].base.driven() && best.base.driven();
+        if leaves_more(&best, &pool[otherwise]) && !driven {
+            return None;
+        }
         let (_, before) = block_score(setting, &pool[otherwise])?;
         let (_, after) = block_score(setting, &best)?;
         let ratio = (after.iter().sum::<f64>() / before.iter().sum::<f64>()).sqrt();
@@ -164,6 +169,11 @@ impl<'d> Remaining<'d> {
         let stands = (sure && better) || better_by_chance(&before, &after)? < BY_CHANCE;
         self.written = (stands && !record.terms.is_empty()).then_some(record);
         stands.then_some(best)
+    }
+
+    /// Whether a parameter walks.
+    pub fn walks(&self) -> bool {
+        self.told().is_some_and(|o| o.words.is_some() && o.writable.is_none())
     }
 
     /// The correction that is told: in place of the set, or of what it leaves.
