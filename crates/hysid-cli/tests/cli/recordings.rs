@@ -61,7 +61,6 @@ fn a_wall_that_rocks_opens_at_its_foot() {
         path
     };
     let (first, second) = lines[1..].split_at(640);
-    let found =
-        diagnosed(&root, "rocking_wall_ts1.sim.toml", &[part("first.csv", first)], &part("second.csv", second));
+    let found = diagnosed(&root, "rocking_wall_ts1.sim.toml", &[part("first.csv", first)], &part("second.csv", second));
     tells(&found, "gap_stop", 0.4);
 }

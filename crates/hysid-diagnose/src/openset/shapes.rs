@@ -3,7 +3,6 @@
 
 use std::f64::consts::TAU;
 
-use hysid_plant::{Expr, Function};
 use hysid_signal::range;
 
 use super::course::Series;
@@ -344,12 +343,6 @@ pub fn surface((a, x): (&str, &[Vec<f64>]), (b, v): (&str, &[Vec<f64>]), radians
 fn spread(x: &[Vec<f64>]) -> f64 {
     let (low, high) = range(x.iter().flatten().copied());
     if high > low { high - low } else { 0.0 }
-}
-
-/// A coordinate, held at the ends of the range that its series has.
-pub fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
-    let (low, high) = range(x.iter().flatten().copied());
-    Expr::call2(Function::Min, Expr::call2(Function::Max, coordinate, low), high)
 }
 
 #[cfg(test)]

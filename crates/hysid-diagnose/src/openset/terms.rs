@@ -3,12 +3,13 @@
 
 use std::sync::Arc;
 
-use hysid_plant::{Expr, Simulation, Slot as Place};
+use hysid_plant::{Expr, Function, Simulation, Slot as Place};
+use hysid_signal::range;
 use rayon::prelude::*;
 
 use super::course::Series;
 use super::past;
-use super::shapes::{self, Kind, Shape, held_beyond};
+use super::shapes::{self, Kind, Shape};
 use super::sites::{Site, Symbol, sites};
 use crate::model::along;
 use crate::model::base::Base;
@@ -32,7 +33,7 @@ pub struct Coordinate {
     pub name: String,
     /// What it stands for in the simulation.
     pub meaning: Expr,
-    /// The same, held at the ends of the range that was seen of it.
+    /// The same, held some way beyond the ends of the range that was seen of it.
     pub held: Expr,
 }
 
@@ -180,4 +181,26 @@ pub fn measured(simulation: &Simulation) -> Vec<(usize, usize, f64)> {
         Some((state, output, s.times))
     };
     sensed(simulation).into_iter().filter_map(place).collect()
+}
+
+/// Share of the range that was seen of a coordinate by which a curve goes on at either end of it, so that it is there on recordings that are up to twice
+/// as loud. Held at the ends themselves, a right law was worse than none on a recording a third louder.
+const BEYOND: f64 = 0.5;
+
+/// A coordinate, held some way beyond the ends of the range that its series has.
+fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
+    let (low, high) = range(x.iter().flatten().copied());
+    let further = BEYOND * (high - low);
+    Expr::call2(Function::Min, Expr::call2(Function::Max, coordinate, low - further), high + further)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_goes_on_to_a_recording_that_is_twice_as_loud() {
+        let held = held_beyond(Expr::symbol("x"), &[vec![-3.0, 1.0], vec![0.0, 3.0]]);
+        assert_eq!(held.to_string(), "min(max(x, -6), 6)");
+    }
 }

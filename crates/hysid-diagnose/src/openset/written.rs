@@ -144,7 +144,7 @@ pub fn with_terms<'t>(
     Some((written, names))
 }
 
-/// What is held at the ends of the range that was seen of it. Beyond that a curve says nothing: there it stays as it is, and with it what it balances within,
+/// What is held some way beyond the ends of the range that was seen of it. Beyond that a curve says nothing: there it stays as it is, and with it what it balances within,
 /// and what a product multiplies it with. Proportions and waves go on, and what was some time ago, which balances nothing within.
 fn held<'t>(terms: &[(&'t Term, f64)]) -> Option<Vec<&'t Expr>> {
     // The coordinates that grow in each term, with the degree at which they do.
@@ -204,7 +204,7 @@ pub fn with_course(simulation: &Simulation, found: &Varying) -> Option<Simulatio
 }
 
 /// A term over the simulation's symbols, the numbers in it parameters; exponents, zero and one are part of its form.
-/// `curves`: coordinates that are held at the ends of what was seen of them.
+/// `curves`: coordinates that are held beyond what was seen of them.
 fn with_free_shapes(simulation: &mut Simulation, term: &Term, curves: &[&Expr]) -> Option<Expr> {
     let parsed = Expr::parse(&term.text).ok()?;
     let curves = if is_past(&parsed) { &[] } else { curves };

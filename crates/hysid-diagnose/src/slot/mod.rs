@@ -39,6 +39,7 @@ use hysid_plant::{Expr, Function, Simulation, Unit};
 use find::presses;
 
 pub use find::Structure;
+pub(crate) use find::feeds;
 
 pub(crate) use algebra::is_linear;
 pub(crate) use balance::with_balances;

@@ -2,7 +2,7 @@
 
 use crate::mechanism::path::{FASTEST, SHORTEST, emptiness, with_duration};
 use crate::mechanism::{Block, Family, Form, Law, Mechanism, Need, Purpose, log_grid};
-use crate::slot::Place;
+use crate::slot::{Place, feeds};
 
 /// A law with the winding's parameters, however short its time constant.
 fn wound(law: Law) -> Law {
@@ -18,7 +18,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
     family: Family::Electrical,
     block: Block::Input,
     places: &[Place::Input, Place::Command],
-    applies: |slot| slot.has("v"),
+    applies: |slot| slot.has("v") && slot.quantity("u").and_then(|u| u.unit.as_ref()).is_none_or(feeds),
     already: &["lag(u - P*v, Q)"],
     law: |slot, purpose| match purpose {
         // The simulation has the winding's resistance and inductance.
@@ -56,6 +56,21 @@ mod tests {
 
     use super::*;
     use crate::slot::Structure;
+
+    #[test]
+    fn what_steers_is_no_voltage() {
+        let fed = |column: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.1\n[inputs]\nu = \"{column}\"\n[parameters]\nK = {{ value = 0.1, min = 0.01 }}\nT = {{ value = 9.0, min = 2.0 }}\n\
+                 [states]\npsi = {{ derivative = \"r\", initial = 0.0, unit = \"deg\" }}\nr = {{ derivative = \"(K*u - r)/T\", initial = 0.0, unit = \"deg/s\" }}\n\
+                 [outputs]\nheading_deg = \"psi\"\n"
+            );
+            let structure = Structure::of(&Simulation::parse(&text, "test.sim.toml").unwrap());
+            !BACK_EMF.slots(&structure).is_empty()
+        };
+        assert!(["drive_V", "coil_A", "torque_Nm", "duty_percent", "command"].into_iter().all(fed));
+        assert!(!["rudder_deg", "rate_rpm", "lift_m", "ground_m_s2"].into_iter().any(fed));
+    }
 
     #[test]
     fn a_winding_has_a_current_or_the_flux_linkage_that_tells_it() {
