@@ -98,18 +98,26 @@ impl Finder<'_> {
                 felt.push((other, there));
             }
             let (other, first) = felt.first()?;
+            // What cancels is the same force, in another share.
+            let of = |unit: &Expr, spring: &Expr| {
+                let share = quotient(spring.clone(), unit.clone());
+                (!unit.symbols().iter().any(|s| share.uses(s))).then_some(share)
+            };
+            let told_by = |unit: &&Expr| own.iter().filter(|spring| of(unit, spring).is_some()).count();
             // The force is that of the deflection's own equation, or the one that the first of the others feels where its own holds several shares of it.
-            let unit = if let [own] = &own[..] { own.clone() } else { -first.clone() };
-            let of_unit = |spring: &Expr| quotient(spring.clone(), unit.clone());
-            let cancelled = |share: &Expr| !unit.symbols().iter().any(|s| share.uses(s));
+            let felt_first = -first.clone();
+            let units = if own.len() > 1 { Some(&felt_first) } else { None };
+            // Of several that tell as much the first, where `max_by_key` would take the last.
+            let unit = units.into_iter().chain(&own).rev().max_by_key(told_by)?.clone();
             let share = |springs: &[Expr]| {
-                let (negative, shares): (Vec<bool>, Vec<Expr>) = springs.iter().map(of_unit).map(signed).unzip();
+                let shares: Option<Vec<Expr>> = springs.iter().map(|spring| of(&unit, spring)).collect();
+                let (negative, shares): (Vec<bool>, Vec<Expr>) = shares?.into_iter().map(signed).unzip();
                 let one_way = negative.iter().all(|n| *n == negative[0]);
                 let whole = shares.into_iter().reduce(|a, b| a + b)?;
-                (one_way && cancelled(&whole)).then(|| (if negative[0] { -1.0 } else { 1.0 }, unless_one(whole)))
+                one_way.then(|| (if negative[0] { -1.0 } else { 1.0 }, unless_one(whole)))
             };
             // Another spring may be at the same coordinate: the tyre under a suspension.
-            let own: Vec<Expr> = own.iter().filter(|spring| cancelled(&of_unit(spring))).cloned().collect();
+            let own: Vec<Expr> = own.iter().filter(|spring| of(&unit, spring).is_some()).cloned().collect();
             let (_, lever) = share(&own).filter(|(sign, _)| *sign > 0.0)?;
             let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.state, 1.0) }];
             for (other, there) in &felt {
@@ -335,6 +343,16 @@ pub(super) mod tests {
         ];
         let found = slots(Place::Connection, &suspended);
         assert_eq!(found, [["d", "w2", "k", "-(1/n + 1/J)*w2 +w1"].map(str::to_owned)]);
+        // An absorber over its stroke, on a part of which it has a share of the mass.
+        let absorbed = [
+            ("q1", "w1", "m"),
+            ("w1", "u - k*q1 + n*(2*c*p*w2 + p^2*d)", "m/s"),
+            ("d", "w2", "m"),
+            ("w2", "-2*c*p*w2 - p^2*d - (u - k*q1 + n*(2*c*p*w2 + p^2*d))", "m/s"),
+        ];
+        let found = slots(Place::Connection, &absorbed);
+        let expected = [["q1", "w1", "k", "-w1 +w2"], ["d", "w2", "p^2", "-(1 + n)*w2 +n*w1"]];
+        assert_eq!(found, expected.map(|slot| slot.map(str::to_owned)));
         // A first effect in an element leaves the second its place.
         let stiffened = [
             drifts[0],
