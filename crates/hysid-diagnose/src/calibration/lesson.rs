@@ -5,6 +5,8 @@
 //! whole gain for itself. Steps are chosen for the simulation without effects: a lag within a sampling period, a stop or an elastic contact asks
 //! for shorter ones, and the set with the smallest error of integration would win and not the true one.
 
+use rayon::prelude::*;
+
 use super::fair::{explains_no_less, recalibrated};
 use super::global::{MOST_SUBSTEPS, calm};
 use crate::evidence::norm2;
@@ -21,6 +23,8 @@ const ERROR: f64 = 2.0;
 
 /// Size of a derivative, over that with half as long steps, at which it is none.
 const EXPLODED: f64 = 10.0;
+/// Iterations of a fit that tells whether shorter steps ask for shorter ones yet.
+const STIFFER: usize = 10;
 /// Times that the likeliest sets take once more of what the whole search took.
 const FITS: f64 = 0.5;
 
@@ -94,7 +98,7 @@ pub fn lesson<'d>(
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
         .filter(|b| b.log_likelihood - none.base.log_likelihood > BETTER.0.max(BETTER.1 * explained));
     let now = setting.substeps;
-    let needed = order.iter().map(|h| enough(setting, h)).max().unwrap_or(now);
+    let needed = needed(setting, &order, done);
     // Half of the time does not depend on the steps.
     let affordable = |steps: usize| budget.affords(done.whole() * (1 + steps) as f64 / (1 + now) as f64);
     let mut substeps = needed;
@@ -133,6 +137,21 @@ pub fn lesson<'d>(
 fn returned<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, h: &Hypothesis<'d>) -> Option<Base<'d>> {
     let b = setting.fit(&setting.original, &h.base.values(), Some(&none.base.whitener), 2, 20)?;
     explains_no_less(&b, &none.base).then_some(b)
+}
+
+/// Integration steps in each sampling period that the likeliest sets need. What steps are too long for is fitted as stiff as they bear: with those that it asks for
+/// it may grow stiffer and ask for more, which would cost another search, and costs a fit here.
+fn needed(setting: &Setting<'_>, sets: &[&Hypothesis<'_>], done: Done) -> usize {
+    let asked = sets.iter().map(|h| enough(setting, h)).max().unwrap_or(setting.substeps);
+    if done == Done::Whole || asked <= setting.substeps {
+        return asked;
+    }
+    let finer = Setting { substeps: asked, ..setting.clone() };
+    let stiffer = |h: &&Hypothesis<'_>| {
+        let base = finer.fit(h.base.model.simulation(), &h.base.values(), Some(&h.base.whitener), 1, STIFFER)?;
+        Some(enough(&finer, &finer.hypothesis(h.effects.clone(), base)))
+    };
+    sets.par_iter().filter_map(stiffer).max().map_or(asked, |more| more.max(asked))
 }
 
 /// Integration steps in each sampling period that a fitted set needs: as many as leave no error that could decide between two sets.
@@ -253,6 +272,8 @@ mod tests {
         let start = finely.hypothesis(Vec::new(), learned.base);
         let after = with(&finely, &start, "sensor_lag");
         assert!(after.base.log_likelihood > pool[0].base.log_likelihood + 5.0 * ERROR && tau(&after) < tau(&pool[0]));
+        // It asks for no shorter ones then: what they would have asked for is asked for at once.
+        assert_eq!(enough(&finely, &after), learned.substeps);
         // Where there is no time for the search, the likeliest sets are fitted once more at its end.
         let late = |share: f64| share < 0.4;
         let budget = Budget::new(&late);
