@@ -4,30 +4,20 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::hysid;
+use crate::common::{hysid, shared};
 use serde_json::Value;
 
-/// The folder beside the repository in which the recordings lie; `None` where there are none and none are required.
-pub fn shared() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    if !root.join("recordings").is_dir() {
-        assert!(std::env::var_os("HYSID_REQUIRE_RECORDINGS").is_none(), "the recordings are needed but not there");
-        println!("skipped: no recordings");
-        return None;
-    }
-    Some(root)
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
 }
 
 /// The diagnosis of a baseline simulation from these files, against another.
 fn diagnosed(root: &Path, simulation: &str, estimation: &[PathBuf], holdout: &Path) -> Value {
     let dir = tempfile::tempdir().unwrap();
-    let text = |path: &Path| path.to_str().unwrap().to_owned();
-    let mut args = vec!["diagnose".to_owned(), text(&root.join("simulations").join(simulation))];
-    estimation.iter().for_each(|file| args.extend(["--recording".to_owned(), text(file)]));
-    let out = dir.path().join("out");
-    let rest = ["--holdout", holdout.to_str().unwrap(), "--out", out.to_str().unwrap(), "--threads", "2"];
-    args.extend([&rest[..], &["--no-black-box"]].concat().iter().map(ToString::to_string));
-    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let (simulation, out) = (root.join("simulations").join(simulation), dir.path().join("out"));
+    let mut args = vec!["diagnose", text(&simulation)];
+    estimation.iter().for_each(|file| args.extend(["--recording", text(file)]));
+    args.extend(["--holdout", text(holdout), "--out", text(&out), "--threads", "2", "--no-black-box"]);
     let (status, _, stderr) = hysid(&args, Path::new("."));
     assert_eq!(status, 0, "{stderr}");
     serde_json::from_str(&std::fs::read_to_string(out.join("diagnosis.json")).unwrap()).unwrap()

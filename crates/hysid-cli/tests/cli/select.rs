@@ -3,8 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::common::hysid;
-use crate::recordings::shared;
+use crate::common::{hysid, shared};
 use hysid_dictionary::{Design, Record, Signals, Spec};
 use hysid_select::{Criterion, Options, Search, select};
 use serde_json::Value;

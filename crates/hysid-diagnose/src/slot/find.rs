@@ -3,7 +3,7 @@
 use hysid_plant::{Expr, Memory, Output, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient};
-use super::motion::{ForcePath, Kinematic, Motion, angle, force_of, force_path, kinematic, motions};
+use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
 use super::{OWN_VELOCITY, Place, Sensed, Slot, Target, sensed};
 
 /// What a simulation is made of, as far as mechanisms care.
@@ -73,8 +73,8 @@ pub(super) fn presses(unit: &Unit) -> bool {
 
 /// Whether what has this unit may be what a drive is fed with: no motion, no flow, no temperature.
 pub(crate) fn feeds(unit: &Unit) -> bool {
-    let others = ["m", "m/s", "m/s^2", "1/s", "1/s^2", "m3", "m3/s", "kg", "kg/s", "K"];
-    angle(unit).is_none() && !is_one_of(unit, &others)
+    let others = ["m/s^2", "1/s", "1/s^2", "m3", "m3/s", "kg", "kg/s", "K"];
+    kinematic(Some(unit), "") == Kinematic::Neither && !is_one_of(unit, &others)
 }
 
 /// Whether a unit is known and measures the same as one of these.

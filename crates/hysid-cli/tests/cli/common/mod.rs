@@ -1,7 +1,7 @@
 //! What the tests of `hysid diagnose` share: good files of an oscillator, and the program itself.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use tempfile::TempDir;
@@ -35,6 +35,17 @@ pub fn hysid(args: &[&str], dir: &Path) -> (i32, String, String) {
         Command::cargo_bin("hysid").unwrap().current_dir(dir).env("RUST_BACKTRACE", "0").args(args).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+/// The folder beside the repository in which the recordings lie; `None` where there are none and none are required.
+pub fn shared() -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    if !root.join("recordings").is_dir() {
+        assert!(std::env::var_os("HYSID_REQUIRE_RECORDINGS").is_none(), "the recordings are needed but not there");
+        println!("skipped: no recordings");
+        return None;
+    }
+    Some(root)
 }
 
 /// All files below a folder (and the folders themselves), with their contents.
