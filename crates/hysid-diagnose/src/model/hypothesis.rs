@@ -55,7 +55,7 @@ pub struct Hypothesis<'d> {
     pub log_evidence: f64,
 }
 
-/// Names of a set, sorted: two hypotheses with the same key are the same statement.
+/// Mechanisms and places of a set, sorted: two hypotheses with the same key are the same statement.
 pub type Key = Vec<(&'static str, String)>;
 
 /// Whether two effects are sums of the same elements at one place: together they are one such sum.
@@ -82,7 +82,7 @@ impl Hypothesis<'_> {
     /// The statement of those of its effects that stay.
     pub fn key_of(&self, stays: impl Fn(usize) -> bool) -> Key {
         let members = self.effects.iter().enumerate().filter(|(i, _)| stays(*i));
-        let mut key: Key = members.map(|(_, e)| (e.mechanism.id, e.slot.label.clone())).collect();
+        let mut key: Key = members.map(|(_, e)| (e.mechanism.id, e.slot.identity())).collect();
         key.sort();
         key
     }

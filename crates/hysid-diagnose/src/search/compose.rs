@@ -17,6 +17,8 @@ use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 /// How a search is bounded.
 #[derive(Debug, Clone, Copy)]
 pub struct SearchOptions {
+    /// Effects of the smallest sets that are looked for.
+    pub first: usize,
     /// Most effects in a set.
     pub depth: usize,
     /// Sets that are extended at each depth.
@@ -114,7 +116,7 @@ pub fn compose<'d>(
     let Ask { unexplained, around, absorbed, .. } = ask;
     let enough = || setting.budget.omits(Step::Composition);
     let mut looks = Looks::default();
-    for depth in 2..=options.depth {
+    for depth in options.first..=options.depth {
         if enough() {
             return;
         }

@@ -59,6 +59,14 @@ fn clear(pool: &[Hypothesis<'_>]) -> Option<Vec<&'static str>> {
     leads_clearly(best, &sets).then(|| pool[best].families())
 }
 
+/// The number of effects of the set that stands in a pool where these are several and it leads clearly over all sets of fewer; 0 where it does not.
+fn composed(pool: &[Hypothesis<'_>]) -> usize {
+    let Some(best) = best_of(pool) else { return 0 };
+    let (effects, evidence) = (pool[best].effects.len(), pool[best].log_evidence);
+    let smaller = pool.iter().filter(|h| h.effects.len() < effects).map(|h| h.log_evidence);
+    if effects > 1 && smaller.fold(f64::NEG_INFINITY, f64::max) <= evidence - CLEAR { effects } else { 0 }
+}
+
 /// Log evidence by which shorter steps may move the gain of a set and have told nothing.
 const MOVED: f64 = 2.0;
 
@@ -181,7 +189,7 @@ pub fn explore<'a, 'd>(
         if let Some(lesson) = learned(&plainly, &start, &pool, Done::Singles) {
             return again(lesson);
         }
-        plainly.combine(&start, &found, &mut pool, !glanced.is_empty());
+        plainly.combine(&start, &found, &mut pool, !glanced.is_empty(), 0);
         glanced.clear();
         let sets = search.under_noise(&none, &pool);
         let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
@@ -194,12 +202,16 @@ pub fn explore<'a, 'd>(
         }
     }
     if significant && gross.is_none() {
-        search.singles(&none, &candidates, &mut pool, &glanced);
-        if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
-            return again(lesson);
+        // What plain squares have composed stands in the pool: under the noise model only what could stand in its members' place is heard.
+        let settled = if set_aside.is_some() { composed(&pool) } else { 0 };
+        if settled == 0 {
+            search.singles(&none, &candidates, &mut pool, &glanced);
+            if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
+                return again(lesson);
+            }
         }
         if !search.is_read(&pool) {
-            search.combine(&none, &candidates, &mut pool, !glanced.is_empty());
+            search.combine(&none, &candidates, &mut pool, !glanced.is_empty(), settled);
         }
         // A noise model under which the best set explains nothing has taken the mismatch for noise: plain squares decide after all.
         if let Some((start, found, sets)) = set_aside

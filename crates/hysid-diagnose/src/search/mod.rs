@@ -173,13 +173,15 @@ impl<'a, 'd> Search<'a, 'd> {
         keep_explaining(none, pool);
     }
 
-    /// Adds what composition makes of the sets there are; `paired` says whether those are the pairs of a glance too.
+    /// Adds what composition makes of the sets there are; `paired` says whether those are the pairs of a glance too, `settled` of how many effects a set is
+    /// there that was composed already, so that none of so many or fewer is looked for but in the place of its members.
     pub fn combine(
         &self,
         none: &Hypothesis<'d>,
         candidates: &[Candidate],
         pool: &mut Vec<Hypothesis<'d>>,
         paired: bool,
+        settled: usize,
     ) {
         (self.hooks.progress)("looking for a second and third effect");
         let unexplained = |h: &Hypothesis<'_>| {
@@ -187,7 +189,7 @@ impl<'a, 'd> Search<'a, 'd> {
             let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured();
             seen || self.open(h).is_some_and(|o| o.by_chance(ODDS_AGAINST_MORE) < self.options.alpha)
         };
-        let bounds = SearchOptions { depth: 3, beam: 2, most: 6 };
+        let bounds = SearchOptions { first: settled.max(1) + 1, depth: 3, beam: 2, most: 6 };
         let around = |h: &Hypothesis<'d>| self.around(h);
         let absorbed = |h: &Hypothesis<'d>| self.absorbed(h);
         let plainly = |h: &Hypothesis<'d>| {

@@ -70,7 +70,7 @@ pub struct Candidate {
 impl Candidate {
     /// The statement that it makes alone.
     pub fn key(&self) -> Key {
-        vec![(self.mechanism.id, self.slot.label.clone())]
+        vec![(self.mechanism.id, self.slot.identity())]
     }
 
     /// Whether the recording shows by itself that something of this kind is there.

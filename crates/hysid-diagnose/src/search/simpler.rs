@@ -31,7 +31,7 @@ pub fn simplify<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, pool: &mut Vec
         .into_par_iter()
         .filter(|(set, member, special)| {
             let mut key = set.key_without(*member);
-            key.push((special.id, set.effects[*member].slot.label.clone()));
+            key.push((special.id, set.effects[*member].slot.identity()));
             key.sort();
             // One that was fitted far off had come to rest somewhere else.
             pool.iter().all(|h| h.key() != key || h.log_evidence < set.log_evidence - NEAR.0)

@@ -1,13 +1,15 @@
-//! Balances of forces that a number turns into another unit.
+//! Balances of forces that stand in a derivative as a part of it.
 //!
-//! `1000*(F - c*v - k*x)/m` is an acceleration in mm/s^2 where the forces are in N. What is missing there is missing among the forces: it should be told in
-//! their unit, and each of them should be a term by itself.
+//! `1000*(F - c*v - k*x)/m` is an acceleration in mm/s^2 where the forces are in N, and in `(F - c*v - k*x)/m - a_g` the ground's acceleration stands beside
+//! them. What is missing there is missing among the forces: it should be told in their unit, and each of them should be a term by itself.
 
 use hysid_plant::{BinaryOp, Expr, Simulation};
 
-use super::algebra::{Factors, product};
+use super::algebra::{Factors, only_parameters, product, quotient};
+use super::find::has_unit;
+use super::motion::motions;
 
-/// The same simulation with such numbers in the mass: `(F - c*v - k*x)/(m/1000)`.
+/// The same simulation with such numbers in the mass, `(F - c*v - k*x)/(m/1000)`, and such accelerations among the forces, `(F - c*v - k*x - m*a_g)/m`.
 pub(crate) fn with_balances(simulation: &Simulation) -> Simulation {
     let mut out = simulation.clone();
     for state in &mut out.states {
@@ -15,7 +17,58 @@ pub(crate) fn with_balances(simulation: &Simulation) -> Simulation {
             state.derivative = balance;
         }
     }
+    for motion in motions(simulation, simulation) {
+        if let Some(balance) = gathered(simulation, motion.derivative)
+            && let Some(state) = out.state_mut(motion.state)
+        {
+            state.derivative = balance;
+        }
+    }
     out
+}
+
+/// Whether an expression is a sum.
+fn is_sum(expr: &Expr) -> bool {
+    matches!(expr, Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..))
+}
+
+/// A sum of forces over a mass and further terms as one sum over the mass; `None` for anything else, and where the divisor may be no mass: a length has the
+/// unit of one, and where there are no units terms of the motion stand beside it.
+fn gathered(simulation: &Simulation, derivative: &Expr) -> Option<Expr> {
+    let terms = derivative.terms();
+    let over_a_mass = |term: &Expr| {
+        let Factors { above, below, positive } = Factors::of(term.clone());
+        let [sum] = <[Expr; 1]>::try_from(above).ok()?;
+        let mass = product(below);
+        let is_one = is_sum(&sum) && mass != Expr::Number(1.0) && only_parameters(simulation, &mass);
+        is_one.then(|| (if positive { sum } else { -sum }, mass))
+    };
+    let parts: Vec<_> = terms.iter().map(|(sign, term)| (*sign, *term, over_a_mass(term))).collect();
+    let mut masses = parts.iter().filter_map(|(_, _, part)| part.as_ref().map(|(_, mass)| mass));
+    let mass = masses.next()?;
+    if terms.len() < 2 || !masses.all(|other| other == mass) {
+        return None;
+    }
+    let moves = |term: &Expr| term.symbols().iter().any(|s| simulation.state(s).is_some());
+    let is_a_mass = match simulation.unit_of_expr(mass) {
+        None => !parts.iter().any(|(_, term, part)| part.is_none() && moves(term)),
+        unit => has_unit(unit, &["kg", "kg m^2"]),
+    };
+    let force = parts.iter().map(|(sign, term, part)| {
+        let force = part
+            .as_ref()
+            .map_or_else(|| quotient(mass.clone() * (*term).clone(), Expr::Number(1.0)), |(sum, _)| sum.clone());
+        (*sign, force)
+    });
+    let joined = force.fold(None, |sum: Option<Expr>, (sign, force)| {
+        Some(match (sum, sign < 0.0) {
+            (None, false) => force,
+            (None, true) => -force,
+            (Some(sum), false) => sum + force,
+            (Some(sum), true) => sum - force,
+        })
+    });
+    is_a_mass.then_some(joined? / mass.clone())
 }
 
 /// Whether a number other than one is among the factors of a mass.
@@ -29,9 +82,9 @@ pub(super) fn is_scaled(mass: &Expr) -> bool {
 fn balance(derivative: &Expr) -> Option<Expr> {
     let mut factors = Factors::of(derivative.clone());
     let number = factors.take_number();
-    let is_sum = matches!(&factors.above[..], [Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..)]);
+    let of_a_sum = matches!(&factors.above[..], [sum] if is_sum(sum));
     let size = number.abs();
-    let is_a_unit = size.is_normal() && size != 1.0 && (is_sum || is_power_of_ten(size, 3.0));
+    let is_a_unit = size.is_normal() && size != 1.0 && (of_a_sum || is_power_of_ten(size, 3.0));
     if factors.below.is_empty() || factors.above.is_empty() || !is_a_unit {
         return None;
     }
@@ -70,6 +123,43 @@ mod tests {
         for other in ["(f - k*x)/m", "-(f - k*x)/m", "1000*(f - k*x)", "2*k*(f - x)/m", "1000/m", "f - 1000*x/m"] {
             check(other, None);
         }
+    }
+
+    /// What the equation of a mass becomes, whose unit is given or not.
+    fn equation(derivative: &str, unit: &str) -> Option<String> {
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\na = \"ground_m_s2\"\n[parameters]\nk = {{ value = 9.0, min = 0.1 }}\nc = {{ value = 1.0, min = 0.1 }}\n\
+             m = {{ value = 2.0, min = 0.1{unit} }}\n[states]\nx = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"{derivative}\", initial = 0.0 }}\n\
+             [outputs]\nx_m = \"x\"\n"
+        );
+        let simulation = Simulation::parse(&text, "storey.sim.toml").unwrap();
+        gathered(&simulation, &simulation.states[1].derivative).map(|e| e.to_string())
+    }
+
+    #[test]
+    fn accelerations_beside_a_balance_go_among_its_forces() {
+        let check = |derivative: &str, unit: &str, expected: Option<&str>| {
+            assert_eq!(equation(derivative, unit).as_deref(), expected, "{derivative}");
+        };
+        let kg = ", unit = \"kg\"";
+        for unit in ["", kg] {
+            check("(-k*x - c*v)/m - a", unit, Some("(-k*x - c*v - m*a)/m"));
+            check("-a + 1/m*(-k*x - c*v)", unit, Some("(-(m*a) + (-k*x - c*v))/m"));
+            check("9.81 - (k*x + c*v)/m", unit, Some("(m*9.81 - (k*x + c*v))/m"));
+            check("(-k*x - c*v)/m - a/m", unit, Some("(-k*x - c*v - a)/m"));
+            for other in ["(-k*x - c*v)/m", "-k*x/m - a", "-k*x - c*v - a", "(a - k*x)/m + (a - c*v)/k"] {
+                check(other, unit, None);
+            }
+        }
+        // A length has no unit of a mass, and without units it may be one.
+        let pendulum = "(-9.81*sin(x) - a)/m - c*v";
+        check(pendulum, ", unit = \"m\"", None);
+        check(pendulum, "", None);
+        check("(-k*x - a)/m - c*v", kg, Some("(-k*x - a - m*c*v)/m"));
+    }
+
+    #[test]
+    fn a_mass_may_hold_a_number() {
         let scaled = |mass: &str| is_scaled(&Expr::parse(mass).unwrap());
         assert!(scaled("m/1000") && scaled("2*m") && !scaled("m") && !scaled("m*n"));
     }

@@ -27,6 +27,16 @@ pub(super) fn forces_of<'e>(simulation: &Simulation, motion: &Motion<'e>) -> imp
     force_of(simulation, motion.derivative).0.terms().into_iter()
 }
 
+/// The terms of a sum, also of one that is divided as a whole, each but for its sign and its divisor.
+fn addends(term: &Expr) -> Vec<&Expr> {
+    match term {
+        Expr::Binary(BinaryOp::Div, above, _) => {
+            above.terms().into_iter().flat_map(|(_, term)| addends(term)).collect()
+        }
+        _ => vec![term],
+    }
+}
+
 /// What connects two parts.
 pub(super) struct Stretch<'a> {
     /// The deflection.
@@ -163,8 +173,9 @@ impl Finder<'_> {
     /// What a connection takes of the first displacement for each unit of the second where that is not one, as a gear has it: the terms of the
     /// first part's force that hold the second displacement hold both in that proportion.
     fn ratio(&self, one: &Motion<'_>, x1: &str, x2: &str) -> Option<Expr> {
-        let mut shared = forces_of(self.simulation, one).filter(|(_, term)| term.uses(x1) && term.uses(x2));
-        let (one, two) = shared.find_map(|(_, t)| Some((coefficient(t, x1)?, coefficient(t, x2)?)))?;
+        let forces = forces_of(self.simulation, one).flat_map(|(_, term)| addends(term));
+        let mut shared = forces.filter(|term| term.uses(x1) && term.uses(x2));
+        let (one, two) = shared.find_map(|t| Some((coefficient(t, x1)?, coefficient(t, x2)?)))?;
         let ratio = quotient(-one.simplified(), two.simplified());
         unless_one(ratio).filter(|ratio| only_parameters(self.simulation, ratio))
     }
@@ -304,6 +315,11 @@ pub(super) mod tests {
         check(
             &with(&[("w1", "(u - k*(q1/n - q2)/n)/J", rate), ("w2", "k*(q1/n - q2)/J", rate)]),
             ["1/n*q1 - q2", "1/n*w1 - w2", "k", "-1/n*w1 +w2"],
+        );
+        // A spring to the ground beside it is no part of a gear, wherever the sum of the forces stands.
+        check(
+            &with(&[("w1", "(u - p*q1 - k*(q1 - q2))/J - c", rate), ("w2", "k*(q1 - q2)/J - c", rate)]),
+            ["q1 - q2", "w1 - w2", "k/J", "-w1 +w2"],
         );
         let twisted = |twist, w1, w2| [("z", twist, rad), ("w1", w1, rate), ("w2", w2, rate)];
         check(&twisted("w1 - w2", "(u - k*z)/J", "k*z/J"), ["z", "w1 - w2", "k", "-w1 +w2"]);

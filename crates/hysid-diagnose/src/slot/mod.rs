@@ -157,6 +157,11 @@ impl Slot {
         (self.place, &self.label, &self.whereabouts) == (other.place, &other.label, &other.whereabouts)
     }
 
+    /// The same place in one word.
+    pub fn identity(&self) -> String {
+        format!("{} ({})", self.label, self.whereabouts)
+    }
+
     /// Whether a force here changes the derivative of this state.
     fn pulls_at(&self, state: &str) -> bool {
         matches!(&self.target, Target::Derivatives(pulls) if pulls.iter().any(|p| p.state == state))
