@@ -35,8 +35,14 @@ struct Fit<'d> {
     hypothesis: Hypothesis<'d>,
 }
 
-/// The correction fitted in the place of, or on top of, a set, without the terms that it does not need.
-pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable) -> Option<Refitted<'d>> {
+/// The correction fitted in the place of, or on top of, a set, without the terms that it does not need; further ones are looked for where it reaches this
+/// log evidence without them.
+pub fn fitted<'d>(
+    setting: &Setting<'d>,
+    parent: &Hypothesis<'d>,
+    writable: &Writable,
+    least: f64,
+) -> Option<Refitted<'d>> {
     let sparse = match writable {
         Writable::Varying(simulation) => {
             let hypothesis = fit(setting, parent, &parent.base.values(), simulation)?;
@@ -46,6 +52,9 @@ pub fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Wri
     };
     let mut best = pruned(setting, parent, sparse, &parent.base.values())?;
     for _ in 0..MORE {
+        if best.hypothesis.log_evidence < least {
+            break;
+        }
         let Some(longer) = with_more(setting, parent, &best) else { break };
         best = longer;
     }

@@ -17,13 +17,15 @@ pub fn signature(
 ) -> SignatureRecord {
     let view = View::new(base, noise);
     let family = |wanted: &dyn Fn(&Term) -> bool| -> f64 {
-        let columns: Vec<Vec<f64>> = terms.iter().filter(|t| wanted(t)).map(|t| t.column.clone()).collect();
-        if columns.is_empty() { f64::NEG_INFINITY } else { view.score(&columns) }
+        let columns: Vec<&[f64]> = terms.iter().filter(|t| wanted(t)).map(|t| t.column.as_slice()).collect();
+        view.score(&columns)
     };
     let plant = |t: &Term| t.side == "plant";
-    let fixed = family(&|t| plant(t) && matches!(t.kind, Kind::Odd | Kind::Even));
-    let play = family(&|t| t.kind == Kind::Play);
-    let lag = family(&|t| plant(t) && t.kind == Kind::Lag);
+    // Hundreds of columns are made orthogonal for each.
+    let (fixed, (play, lag)) = rayon::join(
+        || family(&|t| plant(t) && matches!(t.kind, Kind::Odd | Kind::Even)),
+        || (family(&|t| t.kind == Kind::Play), family(&|t| plant(t) && t.kind == Kind::Lag)),
+    );
     let memory = if play.max(lag) <= fixed + 6.0 {
         "none"
     } else if play >= lag {
@@ -35,13 +37,18 @@ pub fn signature(
     let of_time = |t: &Term| t.kind == Kind::Time;
     let made_of =
         |side: &str| chosen.iter().any(|&i| if of_time(&terms[i]) { side == "time" } else { terms[i].side == side });
-    let side = ["plant", "input", "output"]
-        .into_iter()
-        .map(|s| (s, family(&|t| t.side == s && !of_time(t))))
-        .chain([("time", family(&of_time))])
-        .filter(|(side, _)| made_of(side))
-        .fold(("plant", f64::NEG_INFINITY), |best, x| if x.1 > best.1 { x } else { best })
-        .0;
+    let sides: Vec<&str> = ["plant", "input", "output", "time"].into_iter().filter(|side| made_of(side)).collect();
+    let sees = |side: &str| match side {
+        "time" => family(&of_time),
+        _ => family(&|t| t.side == side && !of_time(t)),
+    };
+    let side = match sides[..] {
+        [only] => only,
+        _ => {
+            let scores = sides.iter().map(|side| (*side, sees(side)));
+            scores.fold(("plant", f64::NEG_INFINITY), |best, x| if x.1 > best.1 { x } else { best }).0
+        }
+    };
     let energy = |wanted: &dyn Fn(Kind) -> bool| -> f64 {
         chosen
             .iter()

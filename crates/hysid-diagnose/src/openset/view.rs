@@ -1,7 +1,12 @@
 //! The residual of a fitted simulation as a noise model sees it.
 
-use crate::evidence::{FeatureGroup, Layout, Projector, Whitener, norm2, score};
+use rayon::prelude::*;
+
+use crate::evidence::{Layout, Projector, Whitener, norm2, score};
 use crate::model::base::{Base, log_likelihood, spared};
+
+/// Share of a column (squared norms) below which what is left of it outside the simulation's own tangents is rounding.
+const INSIDE: f64 = 1e-12;
 
 /// The residual under a noise, off what is estimated besides.
 pub struct View<'a> {
@@ -33,10 +38,20 @@ impl<'a> View<'a> {
         (whole, w)
     }
 
-    /// Score of columns together.
-    pub fn score(&self, columns: &[Vec<f64>]) -> f64 {
-        FeatureGroup::new(columns, self.layout, self.noise, &self.own)
-            .map_or(f64::NEG_INFINITY, |g| score(norm2(&self.r), g.explained(&self.r), self.r.len(), g.columns.len()))
+    /// Score of columns together, which may be hundreds.
+    pub fn score(&self, columns: &[&[f64]]) -> f64 {
+        let outside: Vec<Vec<f64>> = columns
+            .par_iter()
+            .filter_map(|x| {
+                let (whole, rest) = self.column(x);
+                (whole.is_finite() && norm2(&rest) > INSIDE * whole).then_some(rest)
+            })
+            .collect();
+        let span = Projector::new(outside);
+        if span.rank() == 0 {
+            return f64::NEG_INFINITY;
+        }
+        score(norm2(&self.r), span.inside(&self.r), self.r.len(), span.rank())
     }
 
     /// Log likelihood that free amplitudes of a few columns gain.

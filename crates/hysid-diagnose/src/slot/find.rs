@@ -290,8 +290,11 @@ impl Finder<'_> {
             if let Some(output) = self.simulation.outputs.first() {
                 slot.offer(self.simulation, "y", output.expression.clone());
             }
-            let moved = self.motions.iter().find(|m| m.derivative.uses(name)).or(self.motions.first());
-            if let Some(motion) = moved {
+            let of_a_part = self.motions.iter().find(|m| m.derivative.uses(name));
+            if let (None, Some(current)) = (of_a_part, self.current_through(name)) {
+                // What a resistance makes of a current is what a damper makes of a velocity.
+                slot.offer(self.simulation, "v", Expr::symbol(current));
+            } else if let Some(motion) = of_a_part.or(self.motions.first()) {
                 self.offer_motion(&mut slot, motion);
                 self.offer_heat(&mut slot, motion, name);
             } else if let Some(law) = self.force_laws().first() {
@@ -300,9 +303,6 @@ impl Finder<'_> {
                         slot.offer(self.simulation, symbol, q.expression.clone());
                     }
                 }
-            } else if let Some(current) = self.current_through(name) {
-                // What a resistance makes of a current is what a damper makes of a velocity.
-                slot.offer(self.simulation, "v", Expr::symbol(current));
             }
             slot.context = self.equations();
             slots.push(slot);

@@ -62,4 +62,17 @@ mod tests {
             [Some("0.2*w*F*w + F*sign(w)*w"), Some("0.2*w*F*w + F*sign(w)*w"), None],
         );
     }
+
+    #[test]
+    fn a_winding_is_heated_by_its_current_and_not_by_what_it_moves() {
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_V\"\n[parameters]\nL = { value = 0.01, min = 0.001, unit = \"H\" }\n\
+                    R = { value = 1.0, min = 0.1, unit = \"ohm\" }\nK = { value = 0.05, min = 0.01, unit = \"N m/A\" }\nb = { value = 0.1, min = 0.01, unit = \"N m s/rad\" }\n\
+                    J = { value = 0.1, min = 0.01, unit = \"kg m^2\" }\n[states]\nw = { derivative = \"(K*i - b*w)/J\", initial = 0.0, unit = \"rad/s\" }\n\
+                    i = { derivative = \"(u - R*i - K*w)/L\", initial = 0.0, unit = \"A\" }\n[outputs]\nspeed_rad_s = \"w\"\ncurrent_A = \"i\"\n";
+        let slots = Structure::of(&Simulation::parse(text, "motor.sim.toml").unwrap()).slots;
+        let at = |name: &str| slots.iter().find(|s| s.label == format!("parameter:{name}")).unwrap();
+        let rate = |name: &str| at(name).quantity("v").map(|q| q.expression.to_string());
+        assert_eq!(["R", "b", "K"].map(rate), ["i", "w", "w"].map(|v| Some(v.to_owned())));
+        assert!(at("R").dissipates());
+    }
 }

@@ -29,6 +29,9 @@ const HARDLY_ANY: f64 = 0.1;
 /// part of what a term explains once it stands in the equations.
 const WORTH_A_FIT: f64 = 0.25;
 
+/// Share of a set's evidence that generic terms must reach in its place before more of them are looked for.
+const HALFWAY: f64 = 0.5;
+
 /// What is left of a set's residual.
 pub struct Remaining<'d> {
     /// The surrogate test of the residual; `None` where the set is empty or there was no time.
@@ -139,10 +142,12 @@ impl<'d> Remaining<'d> {
             None => {
                 let tried = self.tried.take();
                 let left = self.open.as_ref().filter(|_| trusted);
-                let on_top = left.and_then(|o| Some((o, fitted(setting, &pool[winner], o.writable.as_ref()?)?)));
+                let on_top = left
+                    .and_then(|o| Some((o, fitted(setting, &pool[winner], o.writable.as_ref()?, f64::NEG_INFINITY)?)));
                 let generic = if winner > 0 { search.open(&pool[0]) } else { None };
                 let instead = generic.as_ref().and_then(|o| {
-                    let refitted = tried.or_else(|| fitted(setting, &pool[0], o.writable.as_ref()?))?;
+                    let refitted =
+                        tried.or_else(|| fitted(setting, &pool[0], o.writable.as_ref()?, f64::NEG_INFINITY))?;
                     Some((o, refitted))
                 });
                 let both = on_top.into_iter().chain(instead);
@@ -217,10 +222,11 @@ fn in_place<'d>(
     generic: Option<&OpenSet>,
 ) -> (Option<(Refitted<'d>, OpenSet)>, Option<Refitted<'d>>) {
     let explained = best.log_evidence - none.log_evidence;
+    let halfway = none.log_evidence + HALFWAY * explained;
     let likely =
         |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.gains_by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
     let refitted = |o: &OpenSet, writable: Writable| {
-        let fit = || fitted(&search.setting, none, &writable);
+        let fit = || fitted(&search.setting, none, &writable, halfway);
         let fit = if search.setting.budget.omits(Step::Imitation) { None } else { fit() };
         Some((fit?, o.clone()))
     };
@@ -234,7 +240,8 @@ fn in_place<'d>(
     let (beside, alone) = (seen.and_then(beside), generic.filter(likely).and_then(alone));
     let leads = |swapped: &Option<(Refitted<'d>, OpenSet)>| swapped.as_ref().map(lead).filter(|l| *l > FAR_MORE);
     match (leads(&beside), leads(&alone)) {
-        (None, None) => (None, alone.map(|(refitted, _)| refitted)),
+        // One that was left halfway is no correction yet.
+        (None, None) => (None, alone.map(|(refitted, _)| refitted).filter(|r| r.hypothesis.log_evidence >= halfway)),
         (Some(a), b) if b.is_none_or(|b| b < a) => (beside, None),
         _ => (alone, None),
     }
