@@ -7,7 +7,8 @@ use hysid_plant::{BinaryOp, Expr, Simulation};
 
 use super::algebra::{Factors, only_parameters, product, quotient};
 use super::find::has_unit;
-use super::motion::motions;
+use super::motion::{ForcePath, Motion, force_path, motions};
+use super::turn::is_rate_of_turn;
 
 /// The same simulation with such numbers in the mass, `(F - c*v - k*x)/(m/1000)`, and such accelerations among the forces, `(F - c*v - k*x - m*a_g)/m`.
 pub(crate) fn with_balances(simulation: &Simulation) -> Simulation {
@@ -18,7 +19,7 @@ pub(crate) fn with_balances(simulation: &Simulation) -> Simulation {
         }
     }
     for motion in motions(simulation, simulation) {
-        if let Some(balance) = gathered(simulation, motion.derivative)
+        if let Some(balance) = gathered(simulation, &motion)
             && let Some(state) = out.state_mut(motion.state)
         {
             state.derivative = balance;
@@ -32,35 +33,39 @@ fn is_sum(expr: &Expr) -> bool {
     matches!(expr, Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..))
 }
 
-/// A sum of forces over a mass and further terms as one sum over the mass; `None` for anything else, and where the divisor may be no mass: a length has the
-/// unit of one, and where there are no units terms of the motion stand beside it.
-fn gathered(simulation: &Simulation, derivative: &Expr) -> Option<Expr> {
-    let terms = derivative.terms();
-    let over_a_mass = |term: &Expr| {
-        let Factors { above, below, positive } = Factors::of(term.clone());
-        let [sum] = <[Expr; 1]>::try_from(above).ok()?;
-        let mass = product(below);
-        let is_one = is_sum(&sum) && mass != Expr::Number(1.0) && only_parameters(simulation, &mass);
-        is_one.then(|| (if positive { sum } else { -sum }, mass))
-    };
-    let parts: Vec<_> = terms.iter().map(|(sign, term)| (*sign, *term, over_a_mass(term))).collect();
-    let mut masses = parts.iter().filter_map(|(_, _, part)| part.as_ref().map(|(_, mass)| mass));
-    let mass = masses.next()?;
-    if terms.len() < 2 || !masses.all(|other| other == mass) {
+/// A sum of which some terms are divided by a mass, as one sum of forces over the mass; `None` for anything else, where all terms are divided by the same
+/// already, where several masses divide, and where the divisor may be no mass: a length has the unit of none, and where there are no units terms of the
+/// motion stand beside it. What turns has the moment of inertia that its unit asks for.
+fn gathered(simulation: &Simulation, motion: &Motion<'_>) -> Option<Expr> {
+    let terms = motion.derivative.terms();
+    if terms.len() < 2 || !matches!(force_path(simulation, motion.derivative), ForcePath::Bare) {
         return None;
     }
-    let moves = |term: &Expr| term.symbols().iter().any(|s| simulation.state(s).is_some());
-    let is_a_mass = match simulation.unit_of_expr(mass) {
-        None => !parts.iter().any(|(_, term, part)| part.is_none() && moves(term)),
-        unit => has_unit(unit, &["kg", "kg m^2"]),
+    let below: Vec<Vec<Expr>> = terms.iter().map(|(_, term)| Factors::of((*term).clone()).below).collect();
+    let turns = simulation.unit_of(motion.v).is_some_and(|unit| is_rate_of_turn(&unit));
+    let unit = if turns { "kg m^2" } else { "kg" };
+    let is_inertia = |e: &Expr| only_parameters(simulation, e) && has_unit(simulation.unit_of_expr(e), &[unit]);
+    // A factor, as in `k/(n*J)`, or all of them, as in `u/(m*L^2)`.
+    let inertias = |below: &Vec<Expr>| -> Vec<Vec<Expr>> {
+        let alone = below.iter().map(|e| vec![e.clone()]);
+        alone.chain([below.clone()]).filter(|factors| is_inertia(&product(factors.clone()))).collect()
     };
-    let force = parts.iter().map(|(sign, term, part)| {
-        let force = part
-            .as_ref()
-            .map_or_else(|| quotient(mass.clone() * (*term).clone(), Expr::Number(1.0)), |(sum, _)| sum.clone());
-        (*sign, force)
+    let divides = |mass: &[Expr], below: &[Expr]| mass.iter().all(|factor| below.contains(factor));
+    let known: Vec<Vec<Vec<Expr>>> = below.iter().map(inertias).collect();
+    let times = |mass: &Vec<Expr>| below.iter().filter(|below| divides(mass, below)).count();
+    // Of those that divide as many terms the first, where `max_by_key` would take the last.
+    let mass = match known.iter().flatten().rev().max_by_key(|mass| times(mass)) {
+        Some(mass) => {
+            let others = known.iter().zip(&below).any(|(known, below)| !known.is_empty() && !divides(mass, below));
+            (!others).then(|| product(mass.clone()))?
+        }
+        None => unknown_mass(simulation, &terms, &below)?.clone(),
+    };
+    let forces = terms.iter().map(|(sign, term)| match quotient(mass.clone() * (*term).clone(), Expr::Number(1.0)) {
+        Expr::Neg(force) => (-sign, *force),
+        force => (*sign, force),
     });
-    let joined = force.fold(None, |sum: Option<Expr>, (sign, force)| {
+    let joined = forces.fold(None, |sum: Option<Expr>, (sign, force)| {
         Some(match (sum, sign < 0.0) {
             (None, false) => force,
             (None, true) => -force,
@@ -68,7 +73,26 @@ fn gathered(simulation: &Simulation, derivative: &Expr) -> Option<Expr> {
             (Some(sum), true) => sum - force,
         })
     });
-    is_a_mass.then_some(joined? / mass.clone())
+    Some(joined? / mass)
+}
+
+/// What divides a sum, where its unit is not told and what stands beside the sum is none of the motion.
+fn unknown_mass<'b>(simulation: &Simulation, terms: &[(f64, &Expr)], below: &'b [Vec<Expr>]) -> Option<&'b Expr> {
+    let moves = |term: &Expr| term.symbols().iter().any(|s| simulation.state(s).is_some());
+    let mut found = None;
+    for ((_, term), below) in terms.iter().zip(below) {
+        match (below.as_slice(), Factors::of((*term).clone()).above.as_slice()) {
+            ([mass], [sum]) if is_sum(sum) && only_parameters(simulation, mass) => {
+                if simulation.unit_of_expr(mass).is_some() || found.is_some_and(|known| known != mass) {
+                    return None;
+                }
+                found = Some(mass);
+            }
+            _ if moves(term) => return None,
+            _ => {}
+        }
+    }
+    found
 }
 
 /// Whether a number other than one is among the factors of a mass.
@@ -125,29 +149,28 @@ mod tests {
         }
     }
 
-    /// What the equation of a mass becomes, whose unit is given or not.
-    fn equation(derivative: &str, unit: &str) -> Option<String> {
+    /// What the equation of a mass becomes, whose unit is given or not, as is that of its speed.
+    fn equation(derivative: &str, unit: &str, speed: &str) -> Option<String> {
         let text = format!(
-            "[time]\nperiod_s = 0.01\n[inputs]\na = \"ground_m_s2\"\n[parameters]\nk = {{ value = 9.0, min = 0.1 }}\nc = {{ value = 1.0, min = 0.1 }}\n\
-             m = {{ value = 2.0, min = 0.1{unit} }}\n[states]\nx = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"{derivative}\", initial = 0.0 }}\n\
+            "[time]\nperiod_s = 0.01\n[inputs]\na = \"drive\"\n[parameters]\nk = {{ value = 9.0, min = 0.1 }}\nc = {{ value = 1.0, min = 0.1 }}\n\
+             m = {{ value = 2.0, min = 0.1{unit} }}\n[states]\nx = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"{derivative}\", initial = 0.0{speed} }}\n\
              [outputs]\nx_m = \"x\"\n"
         );
         let simulation = Simulation::parse(&text, "storey.sim.toml").unwrap();
-        gathered(&simulation, &simulation.states[1].derivative).map(|e| e.to_string())
+        gathered(&simulation, &motions(&simulation, &simulation)[0]).map(|e| e.to_string())
     }
 
     #[test]
     fn accelerations_beside_a_balance_go_among_its_forces() {
         let check = |derivative: &str, unit: &str, expected: Option<&str>| {
-            assert_eq!(equation(derivative, unit).as_deref(), expected, "{derivative}");
+            assert_eq!(equation(derivative, unit, "").as_deref(), expected, "{derivative}");
         };
         let kg = ", unit = \"kg\"";
         for unit in ["", kg] {
             check("(-k*x - c*v)/m - a", unit, Some("(-k*x - c*v - m*a)/m"));
             check("-a + 1/m*(-k*x - c*v)", unit, Some("(-(m*a) + (-k*x - c*v))/m"));
             check("9.81 - (k*x + c*v)/m", unit, Some("(m*9.81 - (k*x + c*v))/m"));
-            check("(-k*x - c*v)/m - a/m", unit, Some("(-k*x - c*v - a)/m"));
-            for other in ["(-k*x - c*v)/m", "-k*x/m - a", "-k*x - c*v - a", "(a - k*x)/m + (a - c*v)/k"] {
+            for other in ["(-k*x - c*v)/m", "a/m - k*x/m", "(-k*x - c*v)/m - a/m", "-k*x - c*v - a"] {
                 check(other, unit, None);
             }
         }
@@ -156,6 +179,17 @@ mod tests {
         check(pendulum, ", unit = \"m\"", None);
         check(pendulum, "", None);
         check("(-k*x - a)/m - c*v", kg, Some("(-k*x - a - m*c*v)/m"));
+        check("-k/m*x - c/m*v - a", kg, Some("(-(k*x) - c*v - m*a)/m"));
+        check("-k/m*x - c/m*v - a", "", None);
+        check("(a - k*x)/m + (a - c*v)/k", "", None);
+        // Behind a gear, and between two masses.
+        check("(a - c*v)/m - k*(x/9 - a)/(9*m)", kg, Some("(a - c*v - k*(x/9 - a)/9)/m"));
+        check("(a - c*v)/m - k*x/(k*m)", kg, Some("(a - c*v - x)/m"));
+        // What turns has a moment of inertia.
+        let turning = |unit: &str| equation("a/(m*9^2) - k*sin(x) - c*v", unit, ", unit = \"rad/s\"");
+        assert_eq!(turning(kg), None);
+        let inertia = turning(", unit = \"kg m^2\"");
+        assert_eq!(inertia.as_deref(), Some("(a/81 - m*k*sin(x) - m*c*v)/m"));
     }
 
     #[test]

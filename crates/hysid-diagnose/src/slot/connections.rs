@@ -14,7 +14,7 @@ pub(super) fn is_negative(product: &Expr) -> bool {
 }
 
 /// Whether a product is told with a minus, and the product without it.
-fn signed(product: Expr) -> (bool, Expr) {
+pub(super) fn signed(product: Expr) -> (bool, Expr) {
     match quotient(product, Expr::Number(1.0)) {
         Expr::Neg(size) => (true, *size),
         Expr::Number(n) if n < 0.0 => (true, Expr::Number(-n)),
@@ -88,86 +88,6 @@ impl Finder<'_> {
         slots.extend(self.grounds());
         slots.extend(elements);
         slots
-    }
-
-    /// Connections of a simulation in relative coordinates, as the drifts of storeys: what the deflection of an element pulls with stands in the
-    /// equations of several coordinates, in a term of that deflection alone.
-    fn elements(&self) -> Vec<Slot> {
-        let element = |one: &Motion<'_>| {
-            let x = one.x?;
-            // The rate of the deflection may tell the force of its element once for each of the masses at its ends.
-            let own = self.springs(one, x)?;
-            let mut felt = Vec::new();
-            for other in self.motions.iter().filter(|m| m.v != one.v) {
-                let mut terms = forces_of(self.simulation, other).filter(|(_, t)| t.uses(x));
-                if terms.any(|(_, t)| t.uses(other.v) || other.x.is_some_and(|x2| t.uses(x2))) {
-                    return None;
-                }
-                let Some(springs) = self.springs(other, x) else { continue };
-                let [there] = <[Expr; 1]>::try_from(springs).ok()?;
-                felt.push((other, there));
-            }
-            let (other, first) = felt.first()?;
-            // What cancels is the same force, in another share.
-            let of = |unit: &Expr, spring: &Expr| {
-                let share = quotient(spring.clone(), unit.clone());
-                (!unit.symbols().iter().any(|s| share.uses(s))).then_some(share)
-            };
-            let told_by = |unit: &&Expr| own.iter().filter(|spring| of(unit, spring).is_some()).count();
-            // The force is that of the deflection's own equation, or the one that the first of the others feels where its own holds several shares of it.
-            let felt_first = -first.clone();
-            let units = if own.len() > 1 { Some(&felt_first) } else { None };
-            // Of several that tell as much the first, where `max_by_key` would take the last.
-            let unit = units.into_iter().chain(&own).rev().max_by_key(told_by)?.clone();
-            let share = |springs: &[Expr]| {
-                let shares: Option<Vec<Expr>> = springs.iter().map(|spring| of(&unit, spring)).collect();
-                let (negative, shares): (Vec<bool>, Vec<Expr>) = shares?.into_iter().map(signed).unzip();
-                let one_way = negative.iter().all(|n| *n == negative[0]);
-                let whole = shares.into_iter().reduce(|a, b| a + b)?;
-                one_way.then(|| (if negative[0] { -1.0 } else { 1.0 }, unless_one(whole)))
-            };
-            // Another spring may be at the same coordinate: the tyre under a suspension.
-            let own: Vec<Expr> = own.iter().filter(|spring| of(&unit, spring).is_some()).cloned().collect();
-            let (_, lever) = share(&own).filter(|(sign, _)| *sign > 0.0)?;
-            let mut pulls = vec![Pull { lever: lever.clone(), ..Pull::new(one.state, 1.0) }];
-            for (other, there) in &felt {
-                let (sign, lever) = share(std::slice::from_ref(there))?;
-                pulls.push(Pull { lever, ..Pull::new(other.state, sign) });
-            }
-            let stretch = Stretch {
-                x: Expr::symbol(x),
-                v: one.rate(),
-                symbol: x,
-                lever,
-                other: Some(other),
-                words: format!("in {x}, which pulls at {} coordinates", pulls.len()),
-            };
-            let mut slot = Slot { target: Target::Derivatives(pulls), ..self.connection(one, stretch) };
-            slot.offer(self.simulation, "k", (-unit).simplified());
-            Some(slot)
-        };
-        self.motions.iter().filter_map(element).collect()
-    }
-
-    /// What a deflection pulls with for each unit of it, in each term of the force on a part that is linear in it; `None` where there is none. Another
-    /// term may be what a first effect has put there.
-    pub(super) fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
-        let terms = forces_of(self.simulation, part).filter(|(_, t)| t.uses(x));
-        let all: Vec<Expr> = terms
-            .flat_map(|(sign, term)| match term {
-                // A sum that is divided as a whole may hold several springs.
-                Expr::Binary(BinaryOp::Div, sum, by) => {
-                    let each = sum.terms().into_iter();
-                    each.map(|(own, t)| (sign * own, t.clone() / (**by).clone())).collect()
-                }
-                _ => vec![(sign, term.clone())],
-            })
-            .filter_map(|(sign, term)| {
-                let rate = linear_coefficient(self.simulation, &term, x)?;
-                Some(if sign < 0.0 { -rate } else { rate })
-            })
-            .collect();
-        (!all.is_empty()).then_some(all)
     }
 
     /// What a connection takes of the first displacement for each unit of the second where that is not one, as a gear has it: the terms of the
@@ -315,6 +235,11 @@ pub(super) mod tests {
         check(
             &with(&[("w1", "(u - k*(q1/n - q2)/n)/J", rate), ("w2", "k*(q1/n - q2)/J", rate)]),
             ["1/n*q1 - q2", "1/n*w1 - w2", "k", "-1/n*w1 +w2"],
+        );
+        // The terms of the difference may stand apart.
+        check(
+            &with(&[("w1", "(-(p + k)*q1 + k*q2 - c*w1)/J", rate), ("w2", "(k*q1 - k*q2)/J", rate)]),
+            ["q1 - q2", "w1 - w2", "k", "-w1 +w2"],
         );
         // A spring to the ground beside it is no part of a gear, wherever the sum of the forces stands.
         check(

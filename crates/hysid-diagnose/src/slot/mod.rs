@@ -17,6 +17,7 @@ mod cascades;
 mod cells;
 mod commands;
 mod connections;
+mod elements;
 mod find;
 mod forces;
 mod grounds;

@@ -134,6 +134,7 @@ fn simplify_node(expr: Expr) -> Expr {
                 Mul if is(&a, 1.0) => *b,
                 Mul | Div | Pow if is(&b, 1.0) => *a,
                 Mul if is(&a, -1.0) => negated(*b),
+                Mul if is(&b, -1.0) => negated(*a),
                 Div if zero(&a) && !zero(&b) => Expr::Number(0.0),
                 Pow if zero(&b) => Expr::Number(1.0),
                 _ => Expr::Binary(op, a, b),
