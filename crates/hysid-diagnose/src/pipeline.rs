@@ -29,6 +29,7 @@ use crate::search::rounding::Converter;
 use crate::search::shaken::shake;
 use crate::slot::{with_balances, with_turns, with_used_turns};
 use crate::text::number;
+use crate::verdict::elsewhere::elsewhere;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
 use crate::verdict::trifles::Trifle;
@@ -229,6 +230,9 @@ fn statement(
         file.notes.extend(taken_for_forces(simulation, &best.base.whitener.models));
     }
     file.notes.extend(judged.trifles.iter().map(Trifle::words));
+    if *significant {
+        file.notes.extend(elsewhere(pool, judged.told));
+    }
     if let Some(why) = judged.veto {
         file.notes.push(format!("{why}, and no augmented simulation is written"));
     }

@@ -139,7 +139,7 @@ pub fn without<'d>(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use hysid_plant::{Compiled, Drive, Run, Simulation};
 
     use super::*;
@@ -177,9 +177,8 @@ mod tests {
         check(9000.0, false);
     }
 
-    /// A spring to the ground and one between two masses have one label: each is written where it was found.
-    #[test]
-    fn an_effect_is_written_anew_where_it_stands() {
+    /// Cubic springs at every place of two masses in which nothing is missing, as they were found and as sets that were hardly fitted.
+    pub fn with_springs_of_two_masses(check: impl FnOnce(&[Candidate], Vec<Hypothesis<'_>>)) {
         let text = include_str!("../mechanism/specimens/two_masses.sim.toml");
         let original = Simulation::parse(text, "two_masses.sim.toml").unwrap();
         let mut random = normal(8);
@@ -198,13 +197,27 @@ mod tests {
         let (setting, none) = calibrated(original.clone(), &data, NoiseKind::White(1.0), &budget);
         let found =
             screen(&none.base, &setting.original, &[], &none.base.evidence(), &|m, _| m.id == "cubic_stiffness");
-        let places: Vec<Place> = found.iter().map(|c| c.slot.place).collect();
-        assert!(places.contains(&Place::Force) && places.contains(&Place::Connection), "{places:?}");
-        for c in &found {
+        let written = |c: &Candidate| {
             let part = Part::of_candidate(c, 0, &[]);
-            let set = assemble(&setting, &none, &none.base.values(), &[part], &none.base.whitener, 1).unwrap();
-            assert!(set.effects[0].slot.is_at(&c.slot), "{} {}", c.slot.label, c.slot.whereabouts);
-            assert_eq!(set.effects[0].written.simulation, c.refit.simulation);
-        }
+            assemble(&setting, &none, &none.base.values(), &[part], &none.base.whitener, 1).unwrap()
+        };
+        let sets = found.iter().map(written).collect();
+        check(&found, sets);
+    }
+
+    /// A spring to the ground and one between two masses have one label: they are two statements, and each is written where it was found.
+    #[test]
+    fn an_effect_is_written_anew_where_it_stands() {
+        with_springs_of_two_masses(|found, sets| {
+            let places: Vec<Place> = found.iter().map(|c| c.slot.place).collect();
+            assert!(places.contains(&Place::Force) && places.contains(&Place::Connection), "{places:?}");
+            let alike = |a: &Candidate, b: &Candidate| a.slot.label == b.slot.label;
+            let mut pairs = found.iter().enumerate().flat_map(|(i, a)| found[..i].iter().map(move |b| (a, b)));
+            assert!(pairs.clone().any(|(a, b)| alike(a, b)) && pairs.all(|(a, b)| a.key() != b.key()));
+            for (c, set) in found.iter().zip(&sets) {
+                assert!(set.effects[0].slot.is_at(&c.slot), "{} {}", c.slot.label, c.slot.whereabouts);
+                assert_eq!(set.effects[0].written.simulation, c.refit.simulation);
+            }
+        });
     }
 }

@@ -59,12 +59,18 @@ fn clear(pool: &[Hypothesis<'_>]) -> Option<Vec<&'static str>> {
     leads_clearly(best, &sets).then(|| pool[best].families())
 }
 
-/// The number of effects of the set that stands in a pool where these are several and it leads clearly over all sets of fewer; 0 where it does not.
-fn composed(pool: &[Hypothesis<'_>]) -> usize {
-    let Some(best) = best_of(pool) else { return 0 };
-    let (effects, evidence) = (pool[best].effects.len(), pool[best].log_evidence);
-    let smaller = pool.iter().filter(|h| h.effects.len() < effects).map(|h| h.log_evidence);
-    if effects > 1 && smaller.fold(f64::NEG_INFINITY, f64::max) <= evidence - CLEAR { effects } else { 0 }
+/// The number of effects of the best set where these are several and it leads clearly over all sets of fewer, of sets by their size and evidence; 0 where it
+/// does not.
+fn composed(best: usize, sets: &[(usize, f64)]) -> usize {
+    let (effects, evidence) = sets[best];
+    let leads = sets.iter().all(|&(size, other)| size >= effects || other <= evidence - CLEAR);
+    if effects > 1 && leads { effects } else { 0 }
+}
+
+/// The same of the set that stands in a pool.
+fn settled(pool: &[Hypothesis<'_>]) -> usize {
+    let sets: Vec<(usize, f64)> = pool.iter().map(|h| (h.effects.len(), h.log_evidence)).collect();
+    best_of(pool).map_or(0, |best| composed(best, &sets))
 }
 
 /// Log evidence by which shorter steps may move the gain of a set and have told nothing.
@@ -202,14 +208,12 @@ pub fn explore<'a, 'd>(
         }
     }
     if significant && gross.is_none() {
-        // What plain squares have composed stands in the pool: under the noise model only what could stand in its members' place is heard.
-        let settled = if set_aside.is_some() { composed(&pool) } else { 0 };
-        if settled == 0 {
-            search.singles(&none, &candidates, &mut pool, &glanced);
-            if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
-                return again(lesson);
-            }
+        search.singles(&none, &candidates, &mut pool, &glanced);
+        if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
+            return again(lesson);
         }
+        // Where what plain squares have composed leads under the noise model too, only what could stand in its members' place is heard.
+        let settled = if set_aside.is_some() { settled(&pool) } else { 0 };
         if !search.is_read(&pool) {
             search.combine(&none, &candidates, &mut pool, !glanced.is_empty(), settled);
         }
@@ -278,7 +282,7 @@ pub fn explore<'a, 'd>(
 
 #[cfg(test)]
 mod tests {
-    use super::{leads_clearly, unmoved};
+    use super::{composed, leads_clearly, unmoved};
 
     #[test]
     fn shorter_steps_tell_nothing_where_no_gain_moves() {
@@ -291,6 +295,15 @@ mod tests {
         assert!(other(110.0) && !other(132.0), "what is far behind, and what is no more");
         assert!(!unmoved(&before, &[set("output:y", 139.4), set("input:u", 100.0)]));
         assert!(!unmoved(&before, &[set("input:z", 139.4)]) && !unmoved(&before, &[]));
+    }
+
+    #[test]
+    fn a_composed_set_is_settled_where_it_leads_over_smaller_ones() {
+        let of =
+            |single: f64, pair: f64, best: usize| composed(best, &[(0, 0.0), (1, single), (2, pair), (2, pair - 1.0)]);
+        assert_eq!(of(50.0, 100.0, 2), 2);
+        assert_eq!(of(95.0, 100.0, 2), 0);
+        assert_eq!(of(50.0, 52.0, 1), 0, "one effect is no composition");
     }
 
     #[test]

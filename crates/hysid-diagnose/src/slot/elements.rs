@@ -80,8 +80,8 @@ impl Finder<'_> {
         };
         let Some(stiffness) = pull(one, x2).filter(|k| pull(other, x1).as_ref() == Some(k)) else { return false };
         let holds = |part: &Motion<'_>, x: &str| {
-            let own = pull(part, x).map(|k| (-k).simplified());
-            own.is_some_and(|own| own.terms().into_iter().any(|(sign, term)| sign > 0.0 && *term == stiffness))
+            let own = pull(part, x).map(|k| -k);
+            own.is_some_and(|own| stiffness.terms().iter().all(|term| own.terms().contains(term)))
         };
         // The rate of a deflection tells its force once for each of the masses at its ends.
         let told_once = self.springs(other, x2).is_some_and(|own| own.len() == 1);

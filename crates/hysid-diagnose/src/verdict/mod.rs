@@ -4,6 +4,7 @@
 //! made; where none is, the rivals are listed. Evidence counts with a weight below one, because no model of the catalogue is
 //! exactly right: with full weight mean confidence exceeds accuracy.
 
+pub(crate) mod elsewhere;
 pub(crate) mod firmness;
 pub(crate) mod judgement;
 mod place;
