@@ -279,8 +279,8 @@ fn written<'d>(
     let (search, pool) = (&found.search, &found.pool);
     let (winner, vetoed) = (judged.winner, judged.veto.is_some());
     // What a search had no time for generic terms find: that is no sign of an imitation.
-    let cut_short = search.setting.budget.unfinished();
-    let foreign = judged.rest.foreign && !cut_short;
+    let unfinished = search.setting.budget.unfinished();
+    let foreign = judged.rest.foreign && !unfinished;
     let risk = if winner > 0 && !vetoed { gamble(&search.setting, &judged.contest(pool)) } else { None };
     if let Some(share) = risk {
         file.notes.push(format!("on the recorded inputs mirrored, reversed in time or doubled the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): no augmented simulation is written, since it may be worse than nothing there", number(share)));
@@ -311,7 +311,7 @@ fn written<'d>(
         "the augmented simulation holds the sparse correction, refitted, and no physics that has a name: it predicts blocks of the recordings that it was not fitted to better, and says nothing outside their range"
     } else if judged.rest.spectrum {
         "several relaxations stand beside each other: a memory with many time scales (a fractional element, a spectrum of relaxation times), which the catalogue does not have; within the band of the recording their sum follows it"
-    } else if judged.rest.foreign && cut_short {
+    } else if judged.rest.foreign && unfinished {
         "generic terms explain far more than the effects that were fitted in time: more is missing than these"
     } else if foreign && !vetoed {
         "the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input"

@@ -289,13 +289,9 @@ pub fn answers(pool: &[Hypothesis<'_>], questions: &[Question]) -> Vec<String> {
         .filter_map(|q| {
             let mut asked: Vec<(&str, &str)> = q.iter().map(|(m, s)| (m.as_str(), s.as_str())).collect();
             asked.sort_unstable();
-            let says_so = |h: &&Hypothesis<'_>| {
-                let mut said: Vec<_> = h.effects.iter().map(|e| (e.mechanism.id, e.slot.label.as_str())).collect();
-                said.sort_unstable();
-                said == asked
-            };
             // A force on a part and one between it and another are asked for by one label.
-            let h = pool.iter().filter(says_so).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+            let says_so = pool.iter().filter(|h| h.names() == asked);
+            let h = says_so.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
             let values: Vec<String> = h.effects.iter().map(|e| sentence(e, &reported(&h.base, e))).collect();
             Some(format!(
                 "considered {}: log evidence {:.1} below the best set that was fitted, {:.1} above none. {}",

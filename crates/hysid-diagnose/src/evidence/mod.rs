@@ -30,5 +30,5 @@ pub use noise::NoiseModel;
 pub use projector::{Projector, dot, norm2};
 pub use quantile::quantile;
 pub use response::ForcePath;
-pub use score::{FeatureGroup, detectable_amplitude, score, surprise};
+pub use score::{FeatureGroup, INSIDE, detectable_amplitude, score, surprise};
 pub use surrogate::{Contender, SurrogateTest, TestOptions, correlation_time, surrogate_test};

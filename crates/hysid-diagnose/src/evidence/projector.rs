@@ -35,6 +35,9 @@ pub struct Projector {
     basis: Vec<Vec<f64>>,
 }
 
+/// Times that a column is projected, so that rounding cannot leave a visible part of it inside the span.
+const PASSES: usize = 2;
+
 /// Columns that are projected together: each direction of a basis, of which there may be hundreds, is read once for all of them.
 const TOGETHER: usize = 8;
 
@@ -53,7 +56,7 @@ impl Projector {
             }
             let first = p.rank();
             let before: Vec<f64> = block.iter().map(|c| norm2(c)).collect();
-            for _ in 0..2 {
+            for _ in 0..PASSES {
                 for q in &p.basis {
                     block.iter_mut().for_each(|c| remove_along(std::slice::from_ref(q), c));
                 }
@@ -75,9 +78,7 @@ impl Projector {
         if !(before.is_finite() && before > 0.0) {
             return false;
         }
-        for _ in 0..2 {
-            remove_along(&self.basis[first..], &mut column);
-        }
+        self.remove_from(first, &mut column);
         let after = norm2(&column);
         if after <= before * RANK_TOLERANCE * RANK_TOLERANCE {
             return false;
@@ -98,10 +99,15 @@ impl Projector {
         &self.basis
     }
 
-    /// Projects in place: twice, so that rounding cannot leave a visible part inside the span.
+    /// Projects in place.
     pub fn remove(&self, x: &mut [f64]) {
-        for _ in 0..2 {
-            remove_along(&self.basis, x);
+        self.remove_from(0, x);
+    }
+
+    /// The same off what the basis holds from `first` on.
+    fn remove_from(&self, first: usize, x: &mut [f64]) {
+        for _ in 0..PASSES {
+            remove_along(&self.basis[first..], x);
         }
     }
 

@@ -14,6 +14,9 @@ const LEAST_LEFT: f64 = 1e-3;
 /// An effect that acts where there is next to no noise is seen by other samples too.
 const LEAST_INFLATION: f64 = 0.05;
 
+/// Share of a whitened column (squared norms) below which what is left of it outside the simulation's own tangents is rounding.
+pub const INSIDE: f64 = 1e-12;
+
 /// The response of one effect at one shape: whitened, projected, orthonormalised.
 #[derive(Debug, Clone)]
 pub struct FeatureGroup {
@@ -41,7 +44,7 @@ impl FeatureGroup {
             let before = norm2(&w);
             own.remove(&mut w);
             let after = norm2(&w);
-            if !(before > 0.0 && before.is_finite()) || after < 1e-12 * before {
+            if !(before > 0.0 && before.is_finite()) || after < INSIDE * before {
                 continue;
             }
             if i == 0 || norm == 0.0 {

@@ -106,6 +106,13 @@ impl Hypothesis<'_> {
         })
     }
 
+    /// Its effects by name, sorted: mechanisms and labels of slots, which two places may share.
+    pub fn names(&self) -> Vec<(&str, &str)> {
+        let mut all: Vec<_> = self.effects.iter().map(|e| (e.mechanism.id, e.slot.label.as_str())).collect();
+        all.sort_unstable();
+        all
+    }
+
     /// The families of its effects, sorted.
     pub fn families(&self) -> Vec<&'static str> {
         let mut all: Vec<&str> = self.effects.iter().map(|e| e.mechanism.family.name()).collect();

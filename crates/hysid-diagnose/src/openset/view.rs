@@ -2,11 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::evidence::{Layout, Projector, Whitener, norm2, score};
+use crate::evidence::{INSIDE, Layout, Projector, Whitener, norm2, score};
 use crate::model::base::{Base, log_likelihood, spared};
-
-/// Share of a column (squared norms) below which what is left of it outside the simulation's own tangents is rounding.
-const INSIDE: f64 = 1e-12;
 
 /// The residual under a noise, off what is estimated besides.
 pub struct View<'a> {

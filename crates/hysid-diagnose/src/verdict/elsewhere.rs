@@ -12,7 +12,7 @@ const TIE: f64 = 3.0;
 pub fn elsewhere(pool: &[Hypothesis<'_>], told: usize) -> Vec<String> {
     let best = &pool[told];
     let mut out = Vec::new();
-    let likely = |h: &&Hypothesis<'_>| h.log_evidence > best.log_evidence - TIE && names(h) == names(best);
+    let likely = |h: &&Hypothesis<'_>| h.log_evidence > best.log_evidence - TIE && h.names() == best.names();
     for other in pool.iter().filter(likely) {
         for e in best.effects.iter().filter(|e| !holds(other, e)) {
             let instead = other.effects.iter().find(|o| o.states_the_same(e) && !holds(best, o));
@@ -28,13 +28,6 @@ pub fn elsewhere(pool: &[Hypothesis<'_>], told: usize) -> Vec<String> {
     out.sort();
     out.dedup();
     out
-}
-
-/// What a set says by its names.
-fn names<'h>(h: &'h Hypothesis<'_>) -> Vec<(&'h str, &'h str)> {
-    let mut names: Vec<_> = h.effects.iter().map(|e| (e.mechanism.id, e.slot.label.as_str())).collect();
-    names.sort_unstable();
-    names
 }
 
 /// Whether a set has this effect at this very place.
