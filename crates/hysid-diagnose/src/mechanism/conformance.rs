@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use hysid_plant::{Expr, Simulation};
 
+use super::sentence::name_in;
 use super::{Mechanism, Purpose, Signals, Value, catalogue};
 use crate::slot::{Slot, Structure, with_turns};
 
@@ -183,7 +184,7 @@ pub fn check_form(
 fn placeholders(sentence: &str, in_brackets: bool) -> Vec<&str> {
     let parts = sentence.split(['[', ']']).enumerate().filter(|(i, _)| (i % 2 == 1) == in_brackets);
     let named = parts.flat_map(|(_, part)| part.split('{').skip(1));
-    named.filter_map(|part| part.split_once('}').map(|(name, _)| name)).collect()
+    named.filter_map(|part| part.split_once('}').map(|(inside, _)| name_in(inside))).collect()
 }
 
 /// [`check_form`] for every mechanism at every slot of a simulation.

@@ -103,7 +103,7 @@ pub fn catalogue_page() -> String {
          in: its unit, and its natural size on a recording. `w` is the weight of a form that exists for screening only. Where an input `control`\n\
          controls the simulation's own damping (the voltage of a magnetorheological damper), the forces of `dry_friction`, `presliding` and\n\
          `hysteretic_spring` are multiplied by `1 + b_c*control`. Laws are shown in their plain form; what not every form of a law tells stands in\n\
-         square brackets in its sentence. `sum(...; i = 0.5 .. 11.5)` stands for one term for each `i` in steps of 1.\n",
+         square brackets in its sentence, where `{|F|}` is a size and `{F:grows/falls}` the word for a sign. `sum(...; i = 0.5 .. 11.5)` stands for one term for each `i` in steps of 1.\n",
     );
     let structures: Vec<Structure> = specimens().iter().map(Structure::of).collect();
     for family in Family::ALL {

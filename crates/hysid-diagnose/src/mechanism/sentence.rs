@@ -37,7 +37,7 @@ impl Mechanism {
     /// What to tell people: the values with their units, and where the effect is.
     ///
     /// A value that is not given is left out of the sentence together with its braces, and with the brackets around it where there are any:
-    /// not every form of a law has it.
+    /// not every form of a law has it. `{|F|}` is the size of a value, `{F:grows/falls}` the word for its sign.
     pub fn tell(&self, slot: &Slot, values: &[Value]) -> String {
         let mut told = String::with_capacity(self.sentence.len() + 40);
         for (i, part) in self.sentence.split(['[', ']']).enumerate() {
@@ -51,17 +51,31 @@ impl Mechanism {
     }
 }
 
+/// The name of the value that stands between braces.
+pub(super) fn name_in(braces: &str) -> &str {
+    let name = braces.split_once(':').map_or(braces, |(name, _)| name);
+    name.trim_matches('|')
+}
+
 /// A part of a sentence with its values, and whether all of them were given.
 fn filled(part: &str, slot: &Slot, values: &[Value]) -> (String, bool) {
     let (mut told, mut complete) = (String::new(), true);
     let mut rest = part;
     while let Some((before, after)) = rest.split_once('{') {
         told.push_str(before);
-        let (name, behind) = after.split_once('}').unwrap_or((after, ""));
-        match (name, values.iter().find(|v| v.name == name)) {
-            ("place" | "parameter", _) => told.push_str(&slot.whereabouts),
-            (_, Some(found)) => told.push_str(&number_with_unit(found.value, found.unit.as_ref())),
-            (_, None) => complete = false,
+        let (inside, behind) = after.split_once('}').unwrap_or((after, ""));
+        let name = name_in(inside);
+        let words = inside.split_once(':').and_then(|(_, words)| words.split_once('/'));
+        match (name, values.iter().find(|v| v.name == name), words) {
+            ("place" | "parameter", ..) => told.push_str(&slot.whereabouts),
+            (_, Some(found), Some((upwards, downwards))) => {
+                told.push_str(if found.value < 0.0 { downwards } else { upwards });
+            }
+            (_, Some(found), None) => {
+                let value = if name == inside { found.value } else { found.value.abs() };
+                told.push_str(&number_with_unit(value, found.unit.as_ref()));
+            }
+            (_, None, _) => complete = false,
         }
         rest = behind;
     }
@@ -72,6 +86,7 @@ fn filled(part: &str, slot: &Slot, values: &[Value]) -> (String, bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mechanism::conformance::slot_where;
 
     #[test]
     fn numbers_have_three_digits_and_a_unit() {
@@ -83,5 +98,17 @@ mod tests {
         check(1.2345e-5, "1.23e-5 N");
         check(0.0, "0 N");
         check(-0.25, "-0.25 N");
+    }
+
+    #[test]
+    fn a_friction_that_grows_with_the_speed_is_told_as_one() {
+        let friction = crate::mechanism::mechanism("stribeck_friction").unwrap();
+        let slot = slot_where(friction, |_| true).unwrap();
+        let told = |at_rest: f64| {
+            let value = |name: &str, value: f64| Value { name: name.to_owned(), value, unit: None };
+            friction.tell(&slot, &[value("F_c", 3.0), value("F_d", at_rest), value("v_s", 0.5)])
+        };
+        assert!(told(2.0).ends_with("is 2 larger at rest than when sliding and falls over 0.5."), "{}", told(2.0));
+        assert!(told(-2.0).ends_with("is 2 smaller at rest than when sliding and grows over 0.5."), "{}", told(-2.0));
     }
 }
