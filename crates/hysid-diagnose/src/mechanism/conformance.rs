@@ -47,7 +47,8 @@ specimens!(
     "brace",
     "bearing",
     "stack",
-    "tower"
+    "tower",
+    "iron"
 );
 
 /// A breach of the suite's laws.
@@ -223,6 +224,7 @@ const EXCITATION: &[(f64, f64)] = &[
     (0.002, 4.0),
     (0.01, 40.0),
     (0.02, 10.0),
+    (0.01, 300.0),
 ];
 
 /// A bench for each specimen.

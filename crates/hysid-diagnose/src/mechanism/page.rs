@@ -55,6 +55,7 @@ fn place_name(place: Place) -> &'static str {
         Place::Force => "force on a moving part",
         Place::Connection => "force between two parts",
         Place::ForceLaw => "static force law",
+        Place::Curve => "curve of a static relation",
         Place::Loop => "loop of the simulation",
         Place::Plays => "plays of the simulation",
         Place::Store => "store",

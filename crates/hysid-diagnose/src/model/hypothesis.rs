@@ -58,9 +58,11 @@ pub struct Hypothesis<'d> {
 /// Mechanisms and places of a set, sorted: two hypotheses with the same key are the same statement.
 pub type Key = Vec<(&'static str, String)>;
 
-/// Whether two effects are sums of the same elements at one place: together they are one such sum.
+/// Whether two effects are sums of the same elements of one signal: together they are one such sum.
 pub fn are_one_sum(a: (&Mechanism, &Slot), b: (&Mechanism, &Slot)) -> bool {
-    a.0.family.members_imitate() && a.0.family == b.0.family && a.1.label == b.1.label
+    let of = |slot: &Slot| slot.quantity("u").map(|u| u.expression.clone());
+    let alike = || a.1.label == b.1.label || of(a.1).is_some_and(|u| of(b.1) == Some(u));
+    a.0.family.members_imitate() && a.0.family == b.0.family && alike()
 }
 
 /// Share of the rows that must lie on either side of a moment; beside an effect with a memory, which forgets how it began only when its largest turns

@@ -31,6 +31,7 @@ impl Structure {
         slots.extend(finder.connections());
         slots.extend(finder.force_laws());
         slots.extend(finder.core_laws());
+        slots.extend(finder.curves());
         slots.extend(finder.own_loops());
         slots.extend(finder.own_plays());
         slots.extend(finder.stores());

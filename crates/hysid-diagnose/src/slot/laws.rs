@@ -2,7 +2,7 @@
 
 use hysid_plant::{BinaryOp, Expr, Memory, Output, State};
 
-use super::algebra::{has_free_constant, is_negative, linear_coefficient, quotient};
+use super::algebra::{constant_coefficient, has_free_constant, is_negative, linear_coefficient, quotient};
 use super::find::{Finder, has_unit};
 use super::motion::{Kinematic, angle};
 use super::{Place, Pull, Slot, Target};
@@ -37,6 +37,37 @@ impl Finder<'_> {
                 if let Some(control) = self.control(force, &v) {
                     slot.offer(self.simulation, "control", control);
                 }
+                slots.push(slot);
+            }
+        }
+        slots
+    }
+
+    /// The outputs of a static relation that follow along a curve an input which is no motion. What follows a straight line may as well be behind what
+    /// stands at the input.
+    pub(super) fn curves(&self) -> Vec<Slot> {
+        let simulation = self.simulation;
+        if !simulation.is_static() {
+            return Vec::new();
+        }
+        let is_bent = |output: &Output, symbol: &str| {
+            let mut terms = output.expression.terms().into_iter().filter(|(_, term)| term.uses(symbol));
+            terms.any(|(_, term)| constant_coefficient(simulation, term, symbol).is_none())
+        };
+        let mut slots = Vec::new();
+        for output in &simulation.outputs {
+            let inputs = simulation.inputs.iter().map(|i| i.symbol.as_str());
+            for symbol in inputs.filter(|s| self.kinematic_input(s) == Kinematic::Neither && is_bent(output, s)) {
+                let mut slot = Slot::new(
+                    Place::Curve,
+                    format!("output:{}", output.column),
+                    format!("in {} over {symbol}", output.column),
+                    Target::Output(output.column.clone()),
+                );
+                slot.offer(simulation, "u", Expr::symbol(symbol));
+                slot.offer(simulation, "y", output.expression.clone());
+                self.name_unit(&mut slot, "y", &output.column);
+                slot.context = vec![output.expression.clone()];
                 slots.push(slot);
             }
         }
@@ -155,6 +186,23 @@ mod tests {
         };
         assert_eq!(law("drop_mbar").as_deref(), Some("q"));
         assert_eq!(law("through_L_min"), None);
+    }
+
+    #[test]
+    fn what_bends_an_output_over_an_input_is_a_curve() {
+        let curves = |input: &str, output: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.05\n[inputs]\nh = \"{input}\"\nw = \"bias_V\"\n[parameters]\na = {{ value = 1.5, min = 0.1 }}\n[outputs]\nflux_T = \"{output}\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "core.sim.toml").unwrap()).slots;
+            let curves = slots.into_iter().filter(|s| s.place == Place::Curve);
+            curves.map(|s| s.quantity("u").unwrap().expression.to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!(curves("field_A_per_m", "a*h/(20 + abs(h)) + 2*h + w"), ["h"]);
+        assert_eq!(curves("field_A_per_m", "a*h + w^2"), ["w"]);
+        assert!(curves("field_A_per_m", "a*h/20 + w - 3").is_empty());
+        // Over a displacement it is a force law.
+        assert_eq!(curves("stroke_mm", "a*h^3 + tanh(w)"), ["w"]);
     }
 
     #[test]

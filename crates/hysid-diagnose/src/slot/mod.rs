@@ -90,6 +90,8 @@ pub enum Place {
     Connection,
     /// The output of a static relation, as a force law.
     ForceLaw,
+    /// The output of a static relation, beside the curve along which it follows an input that is no motion: induction over field.
+    Curve,
     /// The rate of a hysteresis loop that the simulation has.
     Loop,
     /// The half-widths of the plays of an input that the simulation has.

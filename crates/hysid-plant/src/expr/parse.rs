@@ -9,7 +9,7 @@ use super::{BinaryOp, Expr, Function, Memory};
 /// Deepest nesting that the parser accepts.
 const MAX_DEPTH: usize = 64;
 /// Most tokens in one expression.
-const MAX_TOKENS: usize = 4000;
+const MAX_TOKENS: usize = 10_000;
 
 /// What is wrong with an expression's text, and where.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -26,10 +26,25 @@ const CELLS: usize = 12;
 
 /// The cells of a density of width `r_d`, as text: the share of each and its half-width.
 pub(super) fn density() -> impl Iterator<Item = (String, String)> {
-    (0..CELLS).map(|i| {
+    cells("0")
+}
+
+/// The same of one about a `middle`.
+pub(super) fn cells(middle: &str) -> impl Iterator<Item = (String, String)> {
+    (0..CELLS).map(move |i| {
         let radius = format!("{i}.5*r_w");
-        (format!("exp(-({radius}/r_d)^2)/{CELLS}"), radius)
+        let away = if middle == "0" { radius.clone() } else { format!("({radius} - {middle})") };
+        (format!("exp(-({away}/r_d)^2)/{CELLS}"), radius)
     })
+}
+
+/// A law of such cells with their widths.
+pub(super) fn widths(law: Law) -> Law {
+    law.shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0])).constant(
+        "r_w",
+        "u",
+        Grid::Reach("u", vec![1.0 / CELLS as f64]),
+    )
 }
 
 /// The plays of a law in one form.
@@ -72,6 +87,15 @@ impl Plays {
         if self.unsettled() { moved_play("u", radius, "u_s") } else { format!("play(u, {radius})") }
     }
 
+    /// A law of these plays with what moved them before the recording.
+    pub fn moved(self, law: Law) -> Law {
+        if self.unsettled() {
+            with_duration(law).shape("u_s", "u", Grid::Values(vec![-2.0, 0.0, 2.0])).within(-10.0, 10.0)
+        } else {
+            law
+        }
+    }
+
     /// The input and, for each play, its weight times what `play` makes of its half-width less the input: for large swings the gain stays
     /// what it was.
     pub fn sum(self, play: impl Fn(&str) -> String) -> String {
@@ -99,17 +123,9 @@ impl Plays {
                     weight(law, i).constant(format!("r_{i}"), "u", Grid::Reach("u", vec![*share]))
                 })
             }
-            _ => law.amplitude("p", "1", -0.2, 5.0).shape("r_d", "u", Grid::Reach("u", vec![0.2, 0.5, 1.0])).constant(
-                "r_w",
-                "u",
-                Grid::Reach("u", vec![1.0 / CELLS as f64]),
-            ),
+            _ => widths(law.amplitude("p", "1", -0.2, 5.0)),
         };
-        let law = if self.unsettled() {
-            with_duration(law).shape("u_s", "u", Grid::Values(vec![-2.0, 0.0, 2.0])).within(-10.0, 10.0)
-        } else {
-            law
-        };
+        let law = self.moved(law);
         let weights: Vec<String> = self.terms().into_iter().map(|(weight, _)| weight).collect();
         law.report("share", "1", weights.join(" + "))
     }
