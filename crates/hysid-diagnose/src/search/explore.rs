@@ -214,7 +214,9 @@ pub fn explore<'a, 'd>(
         }
         // Where what plain squares have composed leads under the noise model too, only what could stand in its members' place is heard.
         let settled = if set_aside.is_some() { settled(&pool) } else { 0 };
-        if !search.is_read(&pool) {
+        // Where a random force explains what the likeliest single effects do, sets of them would take it bit by bit.
+        forced = search.by_a_force_alone(&none, &pool, candidates.len());
+        if forced.is_none() && !search.is_read(&pool) {
             search.combine(&none, &candidates, &mut pool, !glanced.is_empty(), settled);
         }
         // A noise model under which the best set explains nothing has taken the mismatch for noise: plain squares decide after all.
@@ -233,7 +235,7 @@ pub fn explore<'a, 'd>(
         }
         _ => (search, none),
     };
-    let (search, none) = match learned(&search, &none, &pool, Done::Whole).filter(|_| significant) {
+    let (search, none) = match learned(&search, &none, &pool, Done::Whole).filter(|_| significant && forced.is_none()) {
         Some(lesson) if lesson.steps_only => {
             (hooks.progress)("fitting the likeliest sets with shorter steps");
             let next = Setting { substeps: lesson.substeps, ..search.setting.clone() };
@@ -256,7 +258,7 @@ pub fn explore<'a, 'd>(
         Some(lesson) => return again(lesson),
         None => (search, none),
     };
-    if significant && parts(&none) {
+    if significant && forced.is_none() && parts(&none) {
         forced = search.by_a_force(&none, &pool, candidates.len());
     }
     if let Some(p) = forced {

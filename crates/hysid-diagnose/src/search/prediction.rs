@@ -56,7 +56,20 @@ impl<'d> Search<'_, 'd> {
     /// The probability, beyond the level, that sets gain by chance what they gain over a simulation on which an unknown force acts; `None` where
     /// there is no such force, or where sets or generic terms tell more than it does.
     pub fn by_a_force(&self, none: &Hypothesis<'d>, pool: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
-        let (pushed, sets) = self.beside_a_force(none, pool.iter().filter(|h| !h.effects.is_empty()).collect())?;
+        self.told_by_a_force(none, self.pushed(none)?, pool, candidates)
+    }
+
+    /// The same with the simulation as it predicts under the force.
+    fn told_by_a_force(
+        &self,
+        none: &Hypothesis<'d>,
+        pushed: Base<'d>,
+        pool: &[Hypothesis<'d>],
+        candidates: usize,
+    ) -> Option<f64> {
+        (self.hooks.progress)("weighing a random force against the likeliest effects");
+        let sets = pool.iter().filter(|h| !h.effects.is_empty()).collect();
+        let (pushed, sets) = self.beside_a_force(none, pushed, sets);
         let force = pushed.base.log_likelihood - none.base.log_likelihood;
         let told = |o: &OpenSet| o.by_chance(ODDS_AGAINST) < self.options.alpha && o.gain > force;
         if self.open(none).as_ref().is_some_and(told) {
@@ -69,16 +82,38 @@ impl<'d> Search<'_, 'd> {
 
     /// Whether an unknown force that acts on the machine explains what the likeliest of these sets, all of more effects, add to one that stands.
     pub fn is_pushed_rather(&self, stands: &Hypothesis<'d>, wider: &[Hypothesis<'d>], candidates: usize) -> bool {
-        let weighed = if parts(stands) { self.beside_a_force(stands, wider.iter().collect()) } else { None };
-        let Some((pushed, sets)) = weighed else { return false };
+        let Some(pushed) = self.pushed_apart(stands) else { return false };
+        let (pushed, sets) = self.beside_a_force(stands, pushed, wider.iter().collect());
         let sets: Vec<&Hypothesis<'d>> = sets.iter().map(Weighed::better).collect();
         self.likeliest(&pushed, &sets, candidates).is_some_and(|(p, _)| p >= self.options.alpha)
     }
 
     /// What predictions of a set gain in log likelihood over its free run under an unknown force that acts on the machine; `None` where no such force shows.
     pub fn force_on(&self, set: &Hypothesis<'d>) -> Option<f64> {
-        let pushed = if parts(set) { self.pushed(set) } else { None };
-        pushed.map(|base| base.log_likelihood - set.base.log_likelihood)
+        self.pushed_apart(set).map(|base| base.log_likelihood - set.base.log_likelihood)
+    }
+
+    /// The probability that [`Search::by_a_force`] gives single effects, where not even the likeliest of them adds anything to such a force: sets of several
+    /// would take it bit by bit.
+    pub fn by_a_force_alone(
+        &self,
+        none: &Hypothesis<'d>,
+        singles: &[Hypothesis<'d>],
+        candidates: usize,
+    ) -> Option<f64> {
+        let pushed = self.setting.hypothesis(none.effects.clone(), self.pushed_apart(none)?);
+        let free: Vec<&Hypothesis<'d>> = singles.iter().filter(|h| !h.effects.is_empty()).collect();
+        // What tells more than the force while it runs free need not be asked what it predicts.
+        let (p, _) = self.likeliest(&pushed, &free, candidates)?;
+        if p < 1.0 {
+            return None;
+        }
+        self.told_by_a_force(none, pushed.base, singles, candidates).filter(|p| *p >= 1.0)
+    }
+
+    /// [`Search::pushed`] where such a force parts the simulation from its machine.
+    fn pushed_apart(&self, set: &Hypothesis<'d>) -> Option<Base<'d>> {
+        if parts(set) { self.pushed(set) } else { None }
     }
 
     /// A set that predicts each row under an unknown force, fitted from its free run; `None` where no such force shows.
@@ -90,14 +125,14 @@ impl<'d> Search<'_, 'd> {
         (base.log_likelihood > set.base.log_likelihood + FORCE).then_some(base)
     }
 
-    /// What stands, predicting each row under an unknown force, and the likeliest of these sets of more effects; `None` where no such force shows.
+    /// What stands, predicting each row under an unknown force, as it was `pushed` first, and the likeliest of these sets of more effects.
     fn beside_a_force<'h>(
         &self,
         stands: &Hypothesis<'d>,
+        pushed: Base<'d>,
         mut wider: Vec<&'h Hypothesis<'d>>,
-    ) -> Option<(Hypothesis<'d>, Vec<Weighed<'h, 'd>>)> {
+    ) -> (Hypothesis<'d>, Vec<Weighed<'h, 'd>>) {
         let setting = &self.setting;
-        let first = self.pushed(stands)?;
         wider.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         // Where time is up there is some for the likeliest.
         wider.truncate(if setting.budget.affords(0.0) { WEIGHED } else { 1 });
@@ -109,8 +144,8 @@ impl<'d> Search<'_, 'd> {
         // Beside an effect parameters may be reached that predict better without it too.
         let as_it_is = |from: &Base<'d>| predicted(setting, stands.base.model.simulation(), from);
         let returned = sets.iter().filter_map(|set| as_it_is(&set.predicting.as_ref()?.base));
-        let best = returned.fold(first, |a, b| if b.log_likelihood > a.log_likelihood { b } else { a });
-        Some((setting.hypothesis(stands.effects.clone(), best), sets))
+        let best = returned.fold(pushed, |a, b| if b.log_likelihood > a.log_likelihood { b } else { a });
+        (setting.hypothesis(stands.effects.clone(), best), sets)
     }
 }
 
@@ -201,14 +236,16 @@ mod tests {
             axis(forces, cogging, |search, none| {
                 let set = with(search, none, id);
                 let gain = set.log_evidence - none.log_evidence;
-                (search.by_a_force(none, &[set], CANDIDATES), gain)
+                let sets = [set];
+                (search.by_a_force(none, &sets, CANDIDATES), search.by_a_force_alone(none, &sets, CANDIDATES), gain)
             })
         };
-        let (by, gain) = explained(0.3, 0.0, "periodic_disturbance");
+        let (by, alone, gain) = explained(0.3, 0.0, "periodic_disturbance");
         assert!(gain > 20.0 && by.is_some_and(|p| p > Options::default().alpha), "{gain} {by:?}");
+        assert_eq!(alone, by, "nothing is left of it beside the force");
         // A ripple of the motor is followed by such predictions too, and told far better by its own law.
-        let (by, gain) = explained(0.0, 4.0, "cogging");
-        assert!(gain > 100.0 && by.is_none(), "{gain} {by:?}");
+        let (by, alone, gain) = explained(0.0, 4.0, "cogging");
+        assert!(gain > 100.0 && by.is_none() && alone.is_none(), "{gain} {by:?}");
     }
 
     #[test]
