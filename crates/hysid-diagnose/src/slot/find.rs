@@ -323,7 +323,8 @@ impl Finder<'_> {
             .filter_map(|pull| self.simulation.state(&pull.state))
             .map(|s| self.store_slot(Place::Disturbance, label(), &s.name, &s.derivative));
         let mut slots: Vec<Slot> = moving.chain(stored).collect();
-        if slots.is_empty() {
+        // One sensor shows a force and a hum of its own alike; of several, the force is seen by more than one.
+        if slots.is_empty() || self.simulation.outputs.len() > 1 {
             for output in &self.simulation.outputs {
                 let target = Target::Output(output.column.clone());
                 let mut slot = Slot::new(Place::Disturbance, label(), format!("in {}", output.column), target);

@@ -31,3 +31,27 @@ pub static PERIODIC_DISTURBANCE: Mechanism = Mechanism {
     signature: "Coherent with the clock, neither with the input nor with the motion.",
     reference: "M. Bodson, S. C. Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances with unknown frequency, Automatica 33 (1997) 2213-2221",
 };
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::Simulation;
+
+    use super::*;
+    use crate::slot::Structure;
+
+    #[test]
+    fn of_several_sensors_one_may_hum() {
+        let places = |outputs: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_N\"\n[parameters]\nk = {{ value = 9.0, min = 0.1 }}\n[states]\n\
+                 x = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"u - k*x - 2*v\", initial = 0.0 }}\n[outputs]\n{outputs}\n"
+            );
+            let simulation = Simulation::parse(&text, "spring.sim.toml").unwrap();
+            let slots = PERIODIC_DISTURBANCE.slots(&Structure::of(&simulation));
+            assert!(slots.iter().all(|s| s.label == "disturbance"));
+            slots.into_iter().map(|s| s.whereabouts).collect::<Vec<_>>()
+        };
+        assert_eq!(places("x_mm = \"1000*x\""), ["at x"]);
+        assert_eq!(places("x_mm = \"1000*x\"\nrate_m_s = \"v\""), ["at x", "in x_mm", "in rate_m_s"]);
+    }
+}
