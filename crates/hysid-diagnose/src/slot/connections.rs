@@ -266,7 +266,7 @@ pub(super) mod tests {
         let found = slots(Place::Connection, &drifts);
         let expected = [["d1", "v1", "k", "-v1 +v2"], ["d2", "v2", "2*k", "-v2 +1/2*v1"]];
         assert_eq!(found, expected.map(|slot| slot.map(str::to_owned)));
-        // A deflection whose rate tells the force of its element for both of its ends, each with its mass.
+        // A deflection whose rate tells the force of its element for both of its ends, each with its mass; in that of its base stands what holds this, too.
         let relative = [
             ("q1", "w1", "m"),
             ("w1", "(u - n*q1 + k*d + c*w2)/J", "m/s"),
@@ -274,7 +274,8 @@ pub(super) mod tests {
             ("w2", "-(k*d + c*w2)/n - (u - n*q1 + k*d + c*w2)/J", "m/s"),
         ];
         let found = slots(Place::Connection, &relative);
-        assert_eq!(found, [["d", "w2", "k", "-(1/n + 1/J)*w2 +w1"].map(str::to_owned)]);
+        let expected = [["q1", "w1", "n", "-w1 +1/J*w2"], ["d", "w2", "k", "-(1/n + 1/J)*w2 +w1"]];
+        assert_eq!(found, expected.map(|slot| slot.map(str::to_owned)));
         // A suspension over its own deflection, above a tyre.
         let suspended = [
             ("q1", "w1", "m"),

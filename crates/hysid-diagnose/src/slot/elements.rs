@@ -18,7 +18,7 @@ impl Finder<'_> {
             let own = self.springs(one, x)?;
             let mut felt = Vec::new();
             for other in self.motions.iter().filter(|m| m.v != one.v) {
-                let mut terms = forces_of(self.simulation, other).filter(|(_, t)| t.uses(x));
+                let mut terms = self.terms_with(other, x).into_iter();
                 if terms.any(|(_, t)| t.uses(other.v) || other.x.is_some_and(|x2| t.uses(x2))) {
                     return None;
                 }
@@ -88,19 +88,24 @@ impl Finder<'_> {
         told_once && holds(one, x1) && holds(other, x2)
     }
 
+    /// The terms of the force on a part that hold a displacement, each with its sign, also those of a sum that is divided as a whole, which may hold
+    /// several springs.
+    fn terms_with(&self, part: &Motion<'_>, x: &str) -> Vec<(f64, Expr)> {
+        let each = forces_of(self.simulation, part).flat_map(|(sign, term)| match term {
+            Expr::Binary(BinaryOp::Div, sum, by) => {
+                sum.terms().into_iter().map(|(own, t)| (sign * own, t.clone() / (**by).clone())).collect()
+            }
+            _ => vec![(sign, term.clone())],
+        });
+        each.filter(|(_, term)| term.uses(x)).collect()
+    }
+
     /// What a deflection pulls with for each unit of it, in each term of the force on a part that is linear in it; `None` where there is none. Another
     /// term may be what a first effect has put there.
     pub(super) fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
-        let terms = forces_of(self.simulation, part).filter(|(_, t)| t.uses(x));
-        let all: Vec<Expr> = terms
-            .flat_map(|(sign, term)| match term {
-                // A sum that is divided as a whole may hold several springs.
-                Expr::Binary(BinaryOp::Div, sum, by) => {
-                    let each = sum.terms().into_iter();
-                    each.map(|(own, t)| (sign * own, t.clone() / (**by).clone())).collect()
-                }
-                _ => vec![(sign, term.clone())],
-            })
+        let all: Vec<Expr> = self
+            .terms_with(part, x)
+            .into_iter()
             .filter_map(|(sign, term)| {
                 let rate = linear_coefficient(self.simulation, &term, x)?;
                 Some(if sign < 0.0 { -rate } else { rate })
