@@ -1,7 +1,10 @@
 //! Everything that is looked for on one calibration: test, second look, refits, composition, the sets that were asked for.
 
+use rayon::prelude::*;
+
 use super::compose::{add, best_of};
 use super::detectable::detectability;
+use super::finer::finer;
 use super::prediction::parts;
 use super::rounding::rounded;
 use super::screen::Candidate;
@@ -101,6 +104,19 @@ fn put<'d>(pool: &mut Vec<Hypothesis<'d>>, fitted: Vec<Hypothesis<'d>>) -> Vec<K
     keys
 }
 
+/// Gives the laws of the likeliest of these sets the forms that have the most evidence under this noise: plain squares, with as many samples as are
+/// independent, may have had none for them.
+fn reform<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, sets: &mut [Hypothesis<'d>]) {
+    let most = sets.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    sets.par_iter_mut().filter(|h| h.log_evidence > most - CLEAR).for_each(|set| {
+        for index in 0..set.effects.len() {
+            if let Some(other) = finer(setting, none, set, index) {
+                *set = other;
+            }
+        }
+    });
+}
+
 /// Looks for what is missing around a calibrated simulation; where that teaches something of the simulation itself, once more, up to so many
 /// times.
 pub fn explore<'a, 'd>(
@@ -153,6 +169,7 @@ pub fn explore<'a, 'd>(
     if let Some((start, found)) = &under_white {
         (hooks.progress)("refitting the likeliest effects without a noise model");
         pool = search.under_noise(&none, &plainly.glance(start, found));
+        reform(setting, &none, &mut pool);
     }
     // Evidence counts all samples alike: where the noise is not, what is fitted gains as much by chance.
     if test.unequal {
