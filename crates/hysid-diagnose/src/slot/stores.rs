@@ -2,8 +2,9 @@
 
 use hysid_plant::Expr;
 
+use super::algebra::{linear_coefficient, quotient};
 use super::find::{Finder, has_unit, is_one_of};
-use super::motion::CHARGED;
+use super::motion::{CHARGED, force_of};
 use super::pattern::roots;
 use super::{Place, Pull, Slot, Target};
 
@@ -36,9 +37,28 @@ impl Finder<'_> {
         let mut slot = Slot::new(place, label, whereabouts, target);
         slot.offer(self.simulation, "s", Expr::symbol(name));
         self.offer_force(&mut slot, derivative, Some(name), name, None);
+        if self.exchanges(name, derivative) {
+            slot.symbols.remove("k");
+        }
         slot.context = vec![derivative.clone()];
         slot.feeds = self.feeds(name, derivative);
         slot
+    }
+
+    /// Whether all that leaves a store in proportion to what it holds comes back in proportion to what others hold that feel it, as in `c*(p_1 - p_2)`:
+    /// nothing of it is lost. What follows another that does not feel it, as a filter does, holds nothing of that.
+    fn exchanges(&self, name: &str, derivative: &Expr) -> bool {
+        let sum = force_of(self.simulation, derivative).0;
+        let of = |symbol: &str| linear_coefficient(self.simulation, sum, symbol);
+        let others = self.simulation.states.iter().filter(|s| s.name != name && s.derivative.uses(name));
+        let given = others.filter_map(|s| of(&s.name)).reduce(|a, b| a + b);
+        let (Some(own), Some(given)) = (of(name), given) else { return false };
+        let sorted = |sum: &Expr, times: f64| {
+            let mut terms: Vec<String> = sum.terms().iter().map(|(sign, t)| format!("{}*{t}", times * sign)).collect();
+            terms.sort_unstable();
+            terms
+        };
+        sorted(&own, -1.0) == sorted(&given, 1.0) || quotient(-own, given) == Expr::Number(1.0)
     }
 
     /// Whether a root that drains a store stands in the balance of another state as well.
@@ -104,6 +124,26 @@ mod tests {
         slots
             .map(|s| format!("{} {}", s.label, s.quantity("x").map_or("-".into(), |q| q.expression.to_string())))
             .collect()
+    }
+
+    #[test]
+    fn what_two_stores_exchange_is_no_loss() {
+        let losses = |states: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 1.0\n[inputs]\nu = \"supply\"\n[parameters]\nV = {{ value = 2.0, min = 0.1 }}\nc = {{ value = 0.5, min = 0.1 }}\n\
+                 g = {{ value = 0.3, min = 0.1 }}\n[states]\n{states}[outputs]\ny = \"a\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "stores.sim.toml").unwrap()).slots.into_iter();
+            let stores = slots.filter(|s| s.place == Place::Store);
+            stores.map(|s| s.quantity("k").map_or("-".to_owned(), |k| k.expression.to_string())).collect::<Vec<_>>()
+        };
+        let state = |name: &str, rate: &str| format!("{name} = {{ derivative = \"{rate}\", initial = 1.0 }}\n");
+        let b = state("b", "(c*(a - b) - g*b)/V");
+        assert_eq!(losses(&[state("a", "(u - c*(a - b))/V"), b.clone()].concat()), ["-", "-(-c - g)"]);
+        assert_eq!(losses(&[state("a", "u/V - c/V*a + c/V*b"), b.clone()].concat()), ["-", "-(-c - g)"]);
+        assert_eq!(losses(&[state("a", "c*(u - a)"), state("b", "g*(a - b)")].concat()), ["c", "g"], "a filter");
+        let three = [state("a", "(u - c*(a - b) + g*(e - a))/V"), b, state("e", "g*(a - e) - c*e")].concat();
+        assert_eq!(losses(&three), ["-", "-(-c - g)", "-(-g - c)"]);
     }
 
     #[test]
