@@ -216,6 +216,10 @@ impl Unit {
         if let Some((above, time)) = powered(above).zip(time) {
             return Some(Self::quotient(&[above], &[time]));
         }
+        // Capitals before a time may be a unit that is not known, as normal litres: `supply_NL_s`.
+        if time.is_some() && above.contains(|c: char| c.is_ascii_uppercase()) {
+            return None;
+        }
         match (above, powered(last)) {
             ("mol", Some(below)) => return Some(Self::quotient(&[(above, 1)], &[below])),
             // One letter may be the name of a part as well as a unit.

@@ -95,6 +95,8 @@ fn units_multiply_and_compare() {
         ("a_m_s2", Some("m/s^2")),
         ("t_s", Some("s")),
         ("rest_min", Some("min")),
+        ("time_on_s", Some("s")),
+        ("supply_NL_s", None),
         ("conc_mol_L", Some("mol/L")),
         ("density_kg_m3", Some("kg/m^3")),
         ("stroke_mm_V", Some("mm/V")),
