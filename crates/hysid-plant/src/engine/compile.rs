@@ -33,6 +33,11 @@ pub struct Compiled {
     pub(super) prologue: Program,
     /// What the state derivatives need of inputs, time and operators on them, once for each moment.
     pub(super) stimulus: Program,
+    /// Whether what the stimulus is at the end of a step it is at the start of the next one, too, where no input jumps: no operator in it asks where in a
+    /// step it stands, and no event changes the steps.
+    pub(super) stimulus_lasts: bool,
+    /// Whether it rests on the time itself, so that it changes while inputs are held.
+    pub(super) stimulus_ticks: bool,
     /// State derivatives, after the stimulus.
     pub(super) flow: Program,
     /// Arguments of the switching surfaces.
@@ -133,8 +138,12 @@ impl Compiled {
             open.extend(nodes.get(id as usize).into_iter().flat_map(|n| n.operands()).flatten());
         }
         let stimulated = |id: NodeId| held.get(id as usize).copied().unwrap_or(false);
+        let asks = |(node, held): (&Node, &bool)| *held && matches!(node, Node::Lag(..) | Node::Delay(..));
+        let stimulus_lasts = surfaces.is_empty() && !nodes.iter().zip(&held).any(asks);
         Ok(Self {
             prologue: Program::new(&nodes, all_constant, |_| false),
+            stimulus_lasts,
+            stimulus_ticks: nodes.iter().zip(&held).any(|(node, held)| *held && matches!(node, Node::Time)),
             stimulus: Program::new(&nodes, stimuli, constant),
             flow: Program::new(&nodes, derivatives.iter().copied(), |id| level_of(id) < 2),
             switches: Program::new(&nodes, surfaces.iter().map(|s| s.argument), constant),

@@ -69,6 +69,8 @@ pub(super) struct Machine<'a, N> {
     /// Whether a surface is stuck, and whether the signs' registers are those of the modes.
     pub any_stuck: bool,
     pub sigma_set: bool,
+    /// Whether the registers hold the stimulus with which the next step begins.
+    pub stimulated: bool,
     pub lines: Vec<Line>,
     pub distances: Vec<f64>,
     pub width: Width,
@@ -133,6 +135,7 @@ impl<'a, N: Number> Machine<'a, N> {
             sticking: Vec::new(),
             any_stuck: false,
             sigma_set: false,
+            stimulated: false,
             lines: Vec::new(),
             distances: Vec::new(),
             width: Width::of::<N>(),
@@ -174,6 +177,7 @@ impl<'a, N: Number> Machine<'a, N> {
     pub fn go_to(&mut self, n: usize) {
         self.n = n;
         self.tau = N::lift(0.0);
+        self.stimulated &= self.hold == Hold::Linear;
         let drive = self.run.drive;
         let model = self.model;
         self.lines.clear();

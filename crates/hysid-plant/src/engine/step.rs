@@ -1,12 +1,13 @@
 //! The Runge-Kutta step of order 4, with and without a surface that is stuck.
 //!
 //! The step without is what simulations spend their time in: it is compiled as a whole for each instruction set (see
-//! `vector`), what rests on inputs and time only is evaluated once for each of its three moments, and states go straight
+//! `vector`), what rests on inputs and time only is evaluated once for each of its three moments (its start is the end of the step before), and states go straight
 //! into the registers that the program reads.
 
 use super::machine::Machine;
 use super::memory::{Moment, Phase};
 use super::run::Slot;
+use crate::document::Hold;
 use crate::number::{Number, Span};
 
 impl<N: Number> Machine<'_, N> {
@@ -14,9 +15,10 @@ impl<N: Number> Machine<'_, N> {
     #[inline(always)]
     pub fn step_here<S: Span<N>>(&mut self, tau: S, h: S) {
         self.set_signs();
-        let Self { model, registers, cells, stages, x, trial, lines, added, .. } = self;
+        let Self { model, registers, cells, stages, x, trial, lines, added, stimulated, .. } = self;
         let (x, trial) = (x.as_slice(), trial.as_mut_slice());
         let (zero, half) = (h.part(0.0), h.part(0.5));
+        let held = model.stimulus_lasts && !model.stimulus_ticks && self.hold == Hold::Zero && added.is_empty();
         let drive = self.run.drive;
         let sample_s = drive.period_s * self.n as f64;
         for &i in &model.state_numbers {
@@ -29,8 +31,8 @@ impl<N: Number> Machine<'_, N> {
                 _ => (half, Phase::Inside),
             };
             let moment = Moment { sample_s, tau: tau.plus(since), since, step: h, phase };
-            // The third stage is at the moment of the second.
-            if s != 2 {
+            // The third stage is at the moment of the second, the first at that of the last step's fourth, and where inputs are held all are alike.
+            if s != 2 && !(s == 0 && *stimulated) && !(s > 0 && held) {
                 for line in lines.iter() {
                     registers[line.register as usize] = moment.tau.line(line.level, line.slope);
                 }
@@ -67,6 +69,7 @@ impl<N: Number> Machine<'_, N> {
                 }
             }
         }
+        *stimulated = model.stimulus_lasts;
         let [k1, k2, k3, k4] = stages;
         for &i in &model.state_numbers {
             trial[i] = weighted(x[i], h, [k1[i], k2[i], k3[i], k4[i]]);
