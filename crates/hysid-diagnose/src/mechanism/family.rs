@@ -117,6 +117,14 @@ impl Family {
         self == Self::ActuatorHysteresis
     }
 
+    /// Whether a member acts at a place once or not at all: two Stribeck frictions there are some third law, where two lines or two resonances are two.
+    pub fn acts_once(self) -> bool {
+        matches!(
+            self,
+            Self::DryFriction | Self::Presliding | Self::NonlinearDamping | Self::Bias | Self::Gravity | Self::Play
+        )
+    }
+
     /// Whether something outside the catalogue looks like its members on any one recording, so that it is never said firmly: a fractional
     /// element and a spectrum of relaxation times are a single relaxation within the band that was excited, and a zero that moves is what
     /// noise does that rises towards low frequencies.

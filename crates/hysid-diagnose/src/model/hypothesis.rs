@@ -58,11 +58,12 @@ pub struct Hypothesis<'d> {
 /// Mechanisms and places of a set, sorted: two hypotheses with the same key are the same statement.
 pub type Key = Vec<(&'static str, String)>;
 
-/// Whether two effects are sums of the same elements of one signal: together they are one such sum.
-pub fn are_one_sum(a: (&Mechanism, &Slot), b: (&Mechanism, &Slot)) -> bool {
+/// Whether two effects are one law: sums of the same elements of one signal, or what acts at a place once.
+pub fn are_one_law(a: (&Mechanism, &Slot), b: (&Mechanism, &Slot)) -> bool {
     let of = |slot: &Slot| slot.quantity("u").map(|u| u.expression.clone());
     let alike = || a.1.label == b.1.label || of(a.1).is_some_and(|u| of(b.1) == Some(u));
-    a.0.family.members_imitate() && a.0.family == b.0.family && alike()
+    let one_sum = a.0.family.members_imitate() && a.0.family == b.0.family && alike();
+    one_sum || (a.0.family.acts_once() && a.0.id == b.0.id && a.1.is_at(b.1))
 }
 
 /// Share of the rows that must lie on either side of a moment; beside an effect with a memory, which forgets how it began only when its largest turns
@@ -89,9 +90,9 @@ impl Hypothesis<'_> {
         key
     }
 
-    /// Whether two of its effects are one sum.
+    /// Whether two of its effects are one law.
     pub fn repeats_itself(&self) -> bool {
-        let one = |a: &Effect, b: &Effect| are_one_sum((a.mechanism, &a.slot), (b.mechanism, &b.slot));
+        let one = |a: &Effect, b: &Effect| are_one_law((a.mechanism, &a.slot), (b.mechanism, &b.slot));
         self.effects.iter().enumerate().any(|(i, a)| self.effects[..i].iter().any(|b| one(a, b)))
     }
 
@@ -306,6 +307,28 @@ mod tests {
         assert_eq!(best_place(&sets, &key(&["a"])), Some(3));
         assert_eq!(best_place(&sets, &key(&["a", "b"])), Some(4));
         assert_eq!(best_place(&sets, &key(&["c"])), None);
+    }
+
+    #[test]
+    fn a_law_that_acts_once_is_not_said_twice() {
+        use crate::mechanism::conformance::specimens;
+        use crate::mechanism::mechanism;
+        use crate::slot::Structure;
+
+        let two_masses = specimens().into_iter().find(|s| s.title.starts_with("Two masses")).unwrap();
+        let structure = Structure::of(&two_masses);
+        let alike = |first: &str, second: &str| {
+            let [(a, at), (b, there)] =
+                [first, second].map(|id| mechanism(id).map(|m| (m, m.slots(&structure))).unwrap());
+            let same = are_one_law((a, &at[0]), (b, &there[0]));
+            // The force on a part and the one between it and the other share a label.
+            let elsewhere = at.iter().zip(&there).skip(1).any(|(_, other)| are_one_law((a, &at[0]), (b, other)));
+            (same, elsewhere)
+        };
+        assert_eq!(alike("stribeck_friction", "stribeck_friction"), (true, false));
+        assert_eq!(alike("stribeck_friction", "quadratic_damping"), (false, false));
+        assert_eq!(alike("unmodelled_mode", "unmodelled_mode"), (false, false));
+        assert_eq!(alike("prandtl_ishlinskii", "preisach").0, true);
     }
 
     #[test]

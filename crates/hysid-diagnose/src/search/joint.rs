@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::screen::Candidate;
 use crate::evidence::{FeatureGroup, dot, norm2, score};
-use crate::model::hypothesis::are_one_sum;
+use crate::model::hypothesis::are_one_law;
 
 /// Candidates of which all pairs are compared.
 const MOST: usize = 40;
@@ -73,7 +73,7 @@ pub fn pairs(candidates: &[Candidate], r: &[f64], most: usize) -> Vec<Pair> {
         // Siblings of a pair that is there already are left to the swaps.
         let kind = |m: usize| (candidates[m].mechanism.family, candidates[m].slot.label.as_str());
         let [first, second] = members.map(|m| (candidates[m].mechanism, &candidates[m].slot));
-        if are_one_sum(first, second) {
+        if are_one_law(first, second) {
             continue;
         }
         let alike = out.iter().filter(|p| p.members.map(kind) == members.map(kind)).count();
