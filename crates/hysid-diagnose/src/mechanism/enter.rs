@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hysid_plant::{Expr, Output, Simulation};
+use hysid_plant::{Expr, Memory, Output, Simulation};
 
 use super::Change;
 use super::copies::{follow, renewed};
@@ -65,6 +65,20 @@ fn derive(simulation: &mut Simulation, slot: &Slot, name: &str, before: &Expr, a
     }
 }
 
+/// An expression that is changed but for the rates of inputs in it: those of what a law makes of an input are none.
+fn with_its_rates(e: &Expr, change: impl Fn(Expr) -> Expr) -> Expr {
+    let mut rates = Vec::new();
+    let name = |i: usize| Expr::symbol(&format!("?rate{i}"));
+    let hidden = e.clone().map(&mut |part| match part {
+        Expr::Memory(Memory::Derivative, _) => {
+            rates.push(part);
+            name(rates.len() - 1)
+        }
+        other => other,
+    });
+    rates.iter().enumerate().fold(change(hidden), |e, (i, rate)| e.replace(&name(i), rate))
+}
+
 /// Writes the law's text at its target.
 pub(super) fn enter(
     simulation: &mut Simulation,
@@ -75,7 +89,7 @@ pub(super) fn enter(
     match (&slot.target, change) {
         (Target::Symbol(symbol), Change::Replace(text)) => {
             let by = writer.text(text)?;
-            simulation.map_equations(|e| e.substitute(symbol, &by));
+            simulation.map_equations(|e| with_its_rates(e, |e| e.substitute(symbol, &by)));
             Ok(())
         }
         (Target::SymbolIn(symbol, states, others), Change::Replace(text)) => {

@@ -158,8 +158,8 @@ impl Finder<'_> {
             let symbol = &input.symbol;
             let used = self.equations().iter().any(|e| e.uses(symbol));
             let prescribed = law && self.kinematic_input(symbol) != Kinematic::Neither;
-            // In a static law what the motion does is what the law does.
-            if !used || differentiated(symbol) || (prescribed && self.simulation.is_static()) {
+            // In a static law what the motion does is what the law does, and another is not put in its place without its rate.
+            if !used || (prescribed && (differentiated(symbol) || self.simulation.is_static())) {
                 continue;
             }
             let mut slot = Slot::new(
