@@ -5,7 +5,7 @@ use hysid_plant::{Expr, State};
 use super::algebra::{coefficient, has_free_constant, linear_coefficient, only_parameters, product, quotient, size};
 use super::balance::is_scaled;
 use super::connections::forces_of;
-use super::find::{Finder, presses};
+use super::find::{Finder, has_unit, presses};
 use super::motion::{ForcePath, Kinematic, Motion, angle, force_path};
 use super::{Place, Pull, Slot, Target};
 
@@ -113,7 +113,7 @@ impl Finder<'_> {
             slot.offer(self.simulation, "control", control);
         }
         self.offer_motion(&mut slot, motion);
-        if let Some(rad) = motion.x.and_then(|x| self.simulation.unit_of(x).as_ref().and_then(angle)) {
+        if let Some(rad) = motion.x.and_then(|x| self.radians(motion, x)) {
             slot.offer(self.simulation, "rad", rad);
         }
         if let Some(turn) = motion.turn.and_then(|turn| self.simulation.state(turn)) {
@@ -129,6 +129,30 @@ impl Finder<'_> {
         slot.context = vec![motion.derivative.clone()];
         slot.offer_own_sign(self.simulation);
         slot
+    }
+
+    /// What a coordinate is in radians for each unit of it, where it is an angle: by its unit, and where that is none by what an output shows of it
+    /// (`180/pi*q` in degrees) or by a moment of inertia.
+    fn radians(&self, motion: &Motion<'_>, x: &str) -> Option<Expr> {
+        let simulation = self.simulation;
+        let unit = simulation.unit_of(x);
+        if let Some(rad) = unit.as_ref().and_then(angle) {
+            return Some(rad);
+        }
+        if unit.is_some_and(|u| !u.is_none()) {
+            return None;
+        }
+        let number = |e: &Expr| e.symbols().iter().all(|s| s == "pi");
+        let shown = simulation.outputs.iter().find_map(|o| {
+            let rad = self.unit_of_output(&o.column, &o.expression).as_ref().and_then(angle)?;
+            let times = linear_coefficient(simulation, &o.expression, x).filter(number)?;
+            Some(quotient(rad * times, Expr::Number(1.0)))
+        });
+        let mass = match force_path(simulation, motion.derivative) {
+            ForcePath::Quotient(_, mass) | ForcePath::Divided(mass) => simulation.unit_of_expr(mass),
+            ForcePath::Bare => None,
+        };
+        shown.or_else(|| has_unit(mass, &["kg m^2"]).then_some(Expr::Number(1.0)))
     }
 
     pub(super) fn forces(&self) -> Vec<Slot> {
@@ -167,6 +191,26 @@ mod tests {
         // A store that a flow fills, and what depends on more than a velocity, are no displacements.
         check("0.01*w2", "K", "w2");
         check("1000*(w2 - k*x)", "mm", "w2");
+    }
+
+    #[test]
+    fn an_angle_without_a_unit_is_told_by_its_output_or_its_inertia() {
+        let radians = |unit: &str, inertia: &str, output: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"drive\"\n[parameters]\nJ = {{ value = 2.0, min = 0.1{inertia} }}\nk = {{ value = 9.0, min = 0.1 }}\n\
+                 [states]\nbe = {{ derivative = \"w\", initial = 0.0{unit} }}\nw = {{ derivative = \"(u - k*be)/J\", initial = 0.0 }}\n[outputs]\n{output}\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "boom.sim.toml").unwrap()).slots;
+            let force = slots.into_iter().find(|s| s.place == Place::Force).unwrap();
+            force.quantity("rad").map(|q| q.expression.to_string())
+        };
+        let (none, metres, turning) = (", unit = \"-\"", ", unit = \"m\"", ", unit = \"kg m^2\"");
+        assert_eq!(radians(none, "", "boom_deg = \"be*180/pi\"").as_deref(), Some("1"));
+        assert_eq!(radians("", "", "boom_deg = \"be\"").as_deref(), Some("pi/180"));
+        assert_eq!(radians(none, turning, "gauge_V = \"3*be\"").as_deref(), Some("1"));
+        assert_eq!(radians(none, "", "gauge_V = \"3*be\""), None);
+        assert_eq!(radians(metres, turning, "boom_deg = \"be*180/pi\""), None);
+        assert_eq!(radians(", unit = \"deg\"", "", "gauge_V = \"3*be\"").as_deref(), Some("pi/180"));
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub static LOG_CREEP: Mechanism = Mechanism {
     applies: anywhere,
     already: &["lag(u, P)", "lag(y, P)"],
     law: |slot, purpose| {
-        // The logarithm of time as three relaxations, a decade apart until the recording tells how far.
+        // The logarithm of time as three relaxations, a decade apart until the recording tells how far, or as six.
         let s = if slot.place == Place::Sensor { "y" } else { "u" };
         // An actuator that is switched on has not crept yet.
         let (fresh, settled) = match purpose {
@@ -21,15 +21,27 @@ pub static LOG_CREEP: Mechanism = Mechanism {
             Purpose::Form(Form::FinerUnsettled) => (true, Purpose::Form(Form::Finer)),
             other => (false, other),
         };
-        let relaxations = ["tau_1", "(rho*tau_1)", "(rho^2*tau_1)"].map(|tau| match fresh {
-            true => format!("lag({s}, {tau}) - {}", emptiness(s, tau)),
-            false => format!("lag({s}, {tau})"),
+        // A sharp one tells the ripple of three from the line of more.
+        let more = purpose == Purpose::Form(Form::Spaced);
+        let count = if more { 6 } else { 3 };
+        let relaxations = (0..count).map(|i| {
+            let tau = match i {
+                0 => "tau_1".to_owned(),
+                1 => "(rho*tau_1)".to_owned(),
+                _ => format!("(rho^{i}*tau_1)"),
+            };
+            if fresh { format!("lag({s}, {tau}) - {}", emptiness(s, &tau)) } else { format!("lag({s}, {tau})") }
         });
-        let law = Law::replace(format!("{s} + gamma*log10(rho)*({} - 3*{s})", relaxations.join(" + ")))
+        let sum = relaxations.collect::<Vec<_>>().join(" + ");
+        let law = Law::replace(format!("{s} + gamma*log10(rho)*({sum} - {count}*{s})"))
             .amplitude("gamma", "1", 0.0, 0.3)
             .shape("tau_1", "T", Grid::Values(vec![0.001, 0.003, 0.01]))
-            .within(0.0001, 0.1)
-            .detail(settled, "rho", "1", vec![10.0], (3.0, 30.0));
+            .within(0.0001, 0.1);
+        let law = if more {
+            law.shape("rho", "1", Grid::Values(vec![3.0])).within(1.5, 10.0)
+        } else {
+            law.detail(settled, "rho", "1", vec![10.0], (3.0, 30.0))
+        };
         if fresh { with_duration(law) } else { law }
     },
     contains: &[],
