@@ -75,6 +75,11 @@ const KNOWN: &[(&str, [i32; 5])] = &[
     ("percent", [0; 5]),
     ("rpm", [0, 0, -1, 0, 0]),
 ];
+/// Names of units of which each is a product of the others without a factor.
+const COHERENT: [&str; 20] =
+    ["m", "kg", "s", "A", "K", "N", "Nm", "Pa", "J", "W", "Hz", "V", "Ohm", "ohm", "S", "H", "F", "C", "Wb", "T"];
+/// What forces and what circuits have is mostly told in.
+const USUAL: [&str; 11] = ["N", "N m", "Pa", "V", "A", "ohm", "m", "m/s", "m/s^2", "N/m", "N s/m"];
 const BASES: [&str; 5] = ["m", "kg", "s", "A", "K"];
 const PREFIXES: [&str; 8] = ["n", "u", "m", "c", "d", "k", "M", "G"];
 
@@ -129,6 +134,20 @@ impl Unit {
     pub fn root(&self) -> Option<Self> {
         let roots = self.factors.iter().map(|(n, e)| (e % (2 * ONE) == 0).then(|| (n.clone(), e / 2)));
         Some(Self { factors: roots.collect::<Option<_>>()? })
+    }
+
+    /// The same unit by one of the usual names where that takes fewer factors: `N` for `m^2 Pa`, `N m` for `N m V/(A ohm)`. Units that are multiples of
+    /// others (`mm`, `bar`) stay as they are, and so does what holds an angle.
+    pub fn briefly(&self) -> Self {
+        let coherent = |name: &str| COHERENT.contains(&name);
+        if self.factors.iter().all(|(name, _)| coherent(name)) {
+            let usual = USUAL.iter().filter_map(|text| Self::parse(text).ok());
+            let mut shorter = usual.filter(|u| u.factors.len() < self.factors.len());
+            if let Some(unit) = shorter.find(|u| u.same_dimension(self)) {
+                return unit;
+            }
+        }
+        self.clone()
     }
 
     /// Whether no named factor is left.

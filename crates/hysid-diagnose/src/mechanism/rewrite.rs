@@ -44,10 +44,10 @@ fn product_of_units(slot: &Slot, measure: &Expr) -> Option<Unit> {
     }
 }
 
-/// The unit that a reported quantity is told in. What a law measures in turns per time is a frequency: `Hz`, not `1/s`.
+/// The unit that a reported quantity is told in, in few names. What a law measures in turns per time is a frequency: `Hz`, not `1/s`.
 fn unit_told(slot: &Slot, measure: &str) -> Option<Unit> {
     let unit = unit_of_measure(slot, &Expr::parse(measure).ok()?)?;
-    if measure == "1/t" && unit.to_string() == "1/s" { Unit::parse("Hz").ok() } else { Some(unit) }
+    if measure == "1/t" && unit.to_string() == "1/s" { Unit::parse("Hz").ok() } else { Some(unit.briefly()) }
 }
 
 impl Mechanism {

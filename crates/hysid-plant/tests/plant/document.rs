@@ -87,6 +87,20 @@ fn units_multiply_and_compare() {
     // Of a name that is not known nothing is certain, but for what stands beside it on both sides.
     assert!(unit("N").clashes(&unit("N m")) && unit("psi m").clashes(&unit("psi")));
     assert!(!unit("psi").clashes(&unit("Pa")) && !unit("N").clashes(&unit("kg m/s^2")));
+    for (long, brief) in [
+        ("N m V/(A ohm)", "N m"),
+        ("m^2 Pa", "N"),
+        ("kg m/s^2", "N"),
+        ("A ohm", "V"),
+        // What is as short, holds an angle, or is a multiple of another.
+        ("V s", "V s"),
+        ("N s/m", "N s/m"),
+        ("N m/rad", "N m/rad"),
+        ("m^2 bar", "m^2 bar"),
+        ("mm^2 Pa", "mm^2 Pa"),
+    ] {
+        assert_eq!(unit(long).briefly().to_string(), brief, "{long}");
+    }
     for (column, expected) in [
         ("v_cm_s", Some("cm/s")),
         ("force_N", Some("N")),
