@@ -49,6 +49,9 @@ pub struct Diagnosis {
 
 /// Diagnoses a simulation.
 ///
+/// Equations are trees as deep as their sums are long, up to 10 000 symbols: threads of a pool of one's own need a stack of 32 MiB for the longest ones, as
+/// the command's have; 2 MiB do for 4000 symbols.
+///
 /// # Errors
 /// Bad input; never a numerical event.
 pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, DiagnoseError> {
