@@ -68,7 +68,7 @@ fn derive(simulation: &mut Simulation, slot: &Slot, name: &str, before: &Expr, a
 /// An expression that is changed but for the rates of inputs in it: those of what a law makes of an input are none.
 fn with_its_rates(e: &Expr, change: impl Fn(Expr) -> Expr) -> Expr {
     let mut rates = Vec::new();
-    let name = |i: usize| Expr::symbol(&format!("?rate{i}"));
+    let name = |i: usize| Expr::symbol(format!("?rate{i}"));
     let hidden = e.clone().map(&mut |part| match part {
         Expr::Memory(Memory::Derivative, _) => {
             rates.push(part);
