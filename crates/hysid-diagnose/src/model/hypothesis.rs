@@ -60,8 +60,8 @@ pub type Key = Vec<(&'static str, String)>;
 
 /// Whether two effects are one law: sums of the same elements of one signal, or what acts at a place once.
 pub fn are_one_law(a: (&Mechanism, &Slot), b: (&Mechanism, &Slot)) -> bool {
-    let of = |slot: &Slot| slot.quantity("u").map(|u| u.expression.clone());
-    let alike = || a.1.label == b.1.label || of(a.1).is_some_and(|u| of(b.1) == Some(u));
+    let one_signal = || a.1.quantity("u").zip(b.1.quantity("u")).is_some_and(|(u, w)| u.expression == w.expression);
+    let alike = || a.1.label == b.1.label || one_signal();
     let one_sum = a.0.family.members_imitate() && a.0.family == b.0.family && alike();
     one_sum || (a.0.family.acts_once() && a.0.id == b.0.id && a.1.is_at(b.1))
 }

@@ -378,14 +378,9 @@ fn best_below(pool: &[Hypothesis<'_>], effects: usize) -> Option<usize> {
 fn beam(pool: &[Hypothesis<'_>], size: usize, width: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..pool.len()).filter(|&i| pool[i].effects.len() == size).collect();
     order.sort_by(|&a, &b| pool[b].log_evidence.total_cmp(&pool[a].log_evidence));
-    let families = |i: usize| -> Vec<&'static str> {
-        let mut f: Vec<&'static str> = pool[i].effects.iter().map(|e| e.mechanism.family.name()).collect();
-        f.sort_unstable();
-        f
-    };
     let mut chosen: Vec<usize> = Vec::new();
     for &i in &order {
-        if chosen.len() < width && !chosen.iter().any(|&c| families(c) == families(i)) {
+        if chosen.len() < width && !chosen.iter().any(|&c| pool[c].families() == pool[i].families()) {
             chosen.push(i);
         }
     }

@@ -3,7 +3,7 @@
 use hysid_plant::{Expr, Memory, Output, Simulation, State, Unit};
 
 use super::algebra::{has_free_constant, linear_coefficient};
-use super::motion::{ForcePath, Kinematic, Motion, force_of, force_path, kinematic, motions};
+use super::motion::{Kinematic, Motion, force_of, force_path, kinematic, motions};
 use super::{OWN_VELOCITY, Place, Sensed, Slot, Target, sensed};
 
 /// What a simulation is made of, as far as mechanisms care.
@@ -284,10 +284,9 @@ impl Finder<'_> {
             let mut slot =
                 Slot::new(Place::Parameter, format!("parameter:{name}"), name.clone(), Target::Symbol(name.clone()));
             slot.offer(self.simulation, "p", Expr::symbol(name));
-            slot.mass = self.motions.iter().any(|m| match force_path(self.simulation, m.derivative) {
-                ForcePath::Quotient(_, mass) | ForcePath::Divided(mass) => mass.uses(name),
-                ForcePath::Bare => false,
-            });
+            let divides =
+                |m: &Motion<'_>| force_path(self.simulation, m.derivative).mass().is_some_and(|mass| mass.uses(name));
+            slot.mass = self.motions.iter().any(divides);
             if let Some(output) = self.simulation.outputs.first() {
                 slot.offer(self.simulation, "y", output.expression.clone());
             }

@@ -148,10 +148,7 @@ impl Finder<'_> {
             let times = linear_coefficient(simulation, &o.expression, x).filter(number)?;
             Some(quotient(rad * times, Expr::Number(1.0)))
         });
-        let mass = match force_path(simulation, motion.derivative) {
-            ForcePath::Quotient(_, mass) | ForcePath::Divided(mass) => simulation.unit_of_expr(mass),
-            ForcePath::Bare => None,
-        };
+        let mass = force_path(simulation, motion.derivative).mass().and_then(|mass| simulation.unit_of_expr(mass));
         shown.or_else(|| has_unit(mass, &["kg m^2"]).then_some(Expr::Number(1.0)))
     }
 

@@ -16,6 +16,16 @@ pub(crate) enum ForcePath<'a> {
     Bare,
 }
 
+impl<'a> ForcePath<'a> {
+    /// What divides the forces.
+    pub fn mass(self) -> Option<&'a Expr> {
+        match self {
+            Self::Quotient(_, mass) | Self::Divided(mass) => Some(mass),
+            Self::Bare => None,
+        }
+    }
+}
+
 /// The force path of a derivative.
 pub(crate) fn force_path<'a>(simulation: &Simulation, derivative: &'a Expr) -> ForcePath<'a> {
     fn divisor(term: &Expr) -> Option<&Expr> {

@@ -138,12 +138,12 @@ impl Compiled {
             open.extend(nodes.get(id as usize).into_iter().flat_map(|n| n.operands()).flatten());
         }
         let stimulated = |id: NodeId| held.get(id as usize).copied().unwrap_or(false);
-        let asks = |(node, held): (&Node, &bool)| *held && matches!(node, Node::Lag(..) | Node::Delay(..));
-        let stimulus_lasts = surfaces.is_empty() && !nodes.iter().zip(&held).any(asks);
+        let stimulus_has = |test: fn(&Node) -> bool| nodes.iter().zip(&held).any(|(node, held)| *held && test(node));
+        let asks = |node: &Node| matches!(node, Node::Lag(..) | Node::Delay(..));
         Ok(Self {
             prologue: Program::new(&nodes, all_constant, |_| false),
-            stimulus_lasts,
-            stimulus_ticks: nodes.iter().zip(&held).any(|(node, held)| *held && matches!(node, Node::Time)),
+            stimulus_lasts: surfaces.is_empty() && !stimulus_has(asks),
+            stimulus_ticks: stimulus_has(|node| matches!(node, Node::Time)),
             stimulus: Program::new(&nodes, stimuli, constant),
             flow: Program::new(&nodes, derivatives.iter().copied(), |id| level_of(id) < 2),
             switches: Program::new(&nodes, surfaces.iter().map(|s| s.argument), constant),

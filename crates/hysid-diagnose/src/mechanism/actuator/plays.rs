@@ -24,16 +24,11 @@ const SPACED: usize = 6;
 /// Cells of a density.
 const CELLS: usize = 12;
 
-/// The cells of a density of width `r_d`, as text: the share of each and its half-width.
-pub(super) fn density() -> impl Iterator<Item = (String, String)> {
-    cells("0")
-}
-
-/// The same of one about a `middle`.
-pub(super) fn cells(middle: &str) -> impl Iterator<Item = (String, String)> {
+/// The cells of a density of width `r_d` about a middle half-width or about zero, as text: the share of each and its half-width.
+pub(super) fn density(middle: Option<&str>) -> impl Iterator<Item = (String, String)> {
     (0..CELLS).map(move |i| {
         let radius = format!("{i}.5*r_w");
-        let away = if middle == "0" { radius.clone() } else { format!("({radius} - {middle})") };
+        let away = middle.map_or_else(|| radius.clone(), |middle| format!("({radius} - {middle})"));
         (format!("exp(-({away}/r_d)^2)/{CELLS}"), radius)
     })
 }
@@ -64,7 +59,7 @@ impl Plays {
             Purpose::Form(Form::Few | Form::Finer | Form::FinerUnsettled) => {
                 (1..=self.radii().len()).map(|i| (format!("p_{i}"), format!("r_{i}"))).collect()
             }
-            _ => density().map(|(share, radius)| (format!("p*{share}"), radius)).collect(),
+            _ => density(None).map(|(share, radius)| (format!("p*{share}"), radius)).collect(),
         }
     }
 
@@ -132,7 +127,7 @@ impl Plays {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::collections::BTreeMap;
 
     use hysid_plant::{Compiled, Direction, Drive, Run, Simulation};
@@ -153,9 +148,14 @@ mod tests {
         for (name, value) in values {
             written.parameter_mut(name).unwrap_or_else(|| panic!("{purpose:?} has no {name}")).value = *value;
         }
-        let compiled = Compiled::new(&written).unwrap();
+        (response(&written, input), written)
+    }
+
+    /// The output of a simulation under an input.
+    pub fn response(simulation: &Simulation, input: &[f64]) -> Vec<f64> {
+        let compiled = Compiled::new(simulation).unwrap();
         let drive = Drive::new(0.0, 0.01, input.len(), vec![input.to_vec()]).unwrap();
-        (compiled.simulate(&Run::new(&drive, &compiled.theta())).outputs.swap_remove(0), written)
+        compiled.simulate(&Run::new(&drive, &compiled.theta())).outputs.swap_remove(0)
     }
 
     fn values(purpose: Purpose) -> Vec<(&'static str, f64)> {

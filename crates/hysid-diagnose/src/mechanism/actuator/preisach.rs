@@ -1,6 +1,6 @@
 //! Hysteresis of an actuator with a general weight over its turning points.
 
-use super::plays::{Plays, cells, density, widths};
+use super::plays::{Plays, density, widths};
 use crate::mechanism::{Block, Family, Form, Grid, Law, Mechanism, Need, Purpose, anywhere};
 use crate::slot::Place;
 
@@ -21,10 +21,10 @@ fn normal(purpose: Purpose, text: impl Fn(&str) -> String) -> Law {
         _ => Purpose::Refit,
     });
     // Half-widths about zero, or about the field at which most of it turns.
-    let middle = if about { "r_0" } else { "0" };
+    let middle = about.then_some("r_0");
     // The integral of a normal weight of width `u_c` over the level, to a thousandth of it.
     let level = |(share, r): (String, String)| format!("{share}*tanh(1.6*sinh(0.7075*{}/u_c))", plays.play(&r));
-    let sum: Vec<String> = cells(middle).map(level).collect();
+    let sum: Vec<String> = density(middle).map(level).collect();
     let law = plays.moved(Law::replace(text(&sum.join(" + "))));
     let law = widths(law).shape("u_c", "u", Grid::Reach("u", vec![0.1, 0.4]));
     if about { law.shape("r_0", "u", Grid::Reach("u", vec![0.1, 0.3])) } else { law }
@@ -72,7 +72,7 @@ pub static PREISACH: Mechanism = Mechanism {
             let second = if square { format!(" + s*{share}*{play}*{w}^2/u_r^2") } else { String::new() };
             format!(" + q*{share}*{play}*{w}/u_r{second}")
         };
-        let bent: String = density().map(curved).collect();
+        let bent: String = density(None).map(curved).collect();
         let law = scaled(plays.law(format!("{}{bent}", plays.simply()))).amplitude("q", "1", -5.0, 5.0);
         if square { law.amplitude("s", "1", -5.0, 5.0) } else { law }
     },
@@ -88,8 +88,9 @@ pub static PREISACH: Mechanism = Mechanism {
 mod tests {
     use std::collections::BTreeMap;
 
-    use hysid_plant::{Compiled, Drive, Run, Simulation};
+    use hysid_plant::Simulation;
 
+    use super::super::plays::tests::response;
     use super::*;
     use crate::mechanism::Signals;
     use crate::mechanism::conformance::specimens;
@@ -106,12 +107,6 @@ mod tests {
             written.parameter_mut(name).unwrap_or_else(|| panic!("{purpose:?} has no {name}")).value = *value;
         }
         written
-    }
-
-    fn run(simulation: &Simulation, input: &[f64]) -> Vec<f64> {
-        let compiled = Compiled::new(simulation).unwrap();
-        let drive = Drive::new(0.0, 0.01, input.len(), vec![input.to_vec()]).unwrap();
-        compiled.simulate(&Run::new(&drive, &compiled.theta())).outputs.swap_remove(0)
     }
 
     /// Fields that turn at ever other values.
@@ -132,8 +127,8 @@ mod tests {
                 values.push(("r_0", middle));
             }
             let h = field();
-            let with = run(&written("Magnetic core", Place::Curve, form, &values), &h);
-            let without = run(&written("Magnetic core", Place::Curve, form, &[("F_h", 0.0)]), &h);
+            let with = response(&written("Magnetic core", Place::Curve, form, &values), &h);
+            let without = response(&written("Magnetic core", Place::Curve, form, &[("F_h", 0.0)]), &h);
             let mut expected = vec![0.0; h.len()];
             for cell in 0..12 {
                 let r = 75.0 * (f64::from(cell) + 0.5);
@@ -167,10 +162,10 @@ mod tests {
     fn before_the_plant_the_same_weights_take_the_place_of_the_input() {
         let u: Vec<f64> = field();
         let values = [("p", 0.4), ("r_d", 250.0), ("u_c", 180.0)];
-        let own = run(&written("Piezo actuator", Place::Input, Purpose::Form(Form::Other), &values), &u);
+        let own = response(&written("Piezo actuator", Place::Input, Purpose::Form(Form::Other), &values), &u);
         let beside = [("F_h", 1.0), ("r_d", 250.0), ("u_c", 180.0)];
-        let with = run(&written("Magnetic core", Place::Curve, Purpose::Refit, &beside), &u);
-        let without = run(&written("Magnetic core", Place::Curve, Purpose::Refit, &[("F_h", 0.0)]), &u);
+        let with = response(&written("Magnetic core", Place::Curve, Purpose::Refit, &beside), &u);
+        let without = response(&written("Magnetic core", Place::Curve, Purpose::Refit, &[("F_h", 0.0)]), &u);
         for (i, u) in u.iter().enumerate() {
             let expected = 0.1 * (0.6 * u + 0.4 * 180.0 * (with[i] - without[i]));
             assert!((own[i] - expected).abs() < 1e-9, "{i}: {} for {expected}", own[i]);
