@@ -242,6 +242,8 @@ pub fn explore<'a, 'd>(
         {
             pool = sets;
             gross = Some((start, found));
+            // Of a force plain squares know nothing.
+            forced = None;
         }
     }
     let least = under_white.map(|(start, _)| start);
