@@ -192,14 +192,14 @@ pub struct FitRecord {
     pub rmse_black_box: Option<f64>,
 }
 
-/// Share of the error of a simulation in which nothing is missing that a black box leaves at least: it cannot predict noise either.
+/// Share of the error of a simulation in which nothing is missing, or all that was, that a black box leaves at least: it cannot predict noise either.
 const NEVER_BETTER: f64 = 0.75;
 
 impl FitRecord {
-    /// The share of the simulation's error that a black box leaves, where that is so much less that something is missing after all: a model without any
-    /// physics predicts what neither has seen far better.
+    /// The share of the error of the augmented simulation, or of the simulation as it is where none is written, that a black box leaves, where that is so much
+    /// less that something is missing still: a model without any physics predicts what neither has seen far better.
     pub fn outdone(&self) -> Option<f64> {
-        let share = self.rmse_black_box? / self.rmse_before?;
+        let share = self.rmse_black_box? / self.rmse_after.or(self.rmse_before)?;
         (share < NEVER_BETTER).then_some(share)
     }
 }

@@ -179,6 +179,10 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
         after: after.as_ref(),
         noise: &noise,
     });
+    let unexplained = picture.unexplained();
+    if file.verdict == VerdictKind::NoSignificantMismatch && !runs_away && !budget.unfinished() {
+        file.summary = without_mismatch(&unexplained).unwrap_or(file.summary);
+    }
     Ok(Diagnosis { file, baseline, augmented, picture })
 }
 
@@ -237,7 +241,7 @@ fn statement(
         file.notes.extend(elsewhere(pool, judged.told));
     }
     if let Some(why) = judged.veto {
-        file.notes.push(format!("{why}, and no augmented simulation is written"));
+        file.notes.push(format!("{why}, and these effects are not written"));
     }
     if judged.rest.pushed {
         file.notes.push("predicted from sample to sample, the simulation with these effects follows the recording far better than anything does that could be fitted to what its free run leaves: random forces that act on the machine explain that".into());
@@ -286,7 +290,7 @@ fn written<'d>(
     let foreign = judged.rest.foreign && !unfinished;
     let risk = if winner > 0 && !vetoed { gamble(&search.setting, &judged.contest(pool)) } else { None };
     if let Some(share) = risk {
-        file.notes.push(format!("on the recorded inputs mirrored, reversed in time or doubled the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): no augmented simulation is written, since it may be worse than nothing there", number(share)));
+        file.notes.push(format!("on the recorded inputs mirrored, reversed in time or doubled the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): these effects are not written, since they may be worse than nothing there", number(share)));
     }
     // Another recording sees another course of what wanders: what follows this one is worse than nothing there.
     let believed = winner > 0 && !vetoed && risk.is_none();

@@ -21,6 +21,25 @@ pub struct Picture {
     pub parameters: Vec<ParameterPicture>,
 }
 
+/// Share of an output (rms about its mean) that a simulation leaves which explains next to nothing of it.
+const NEXT_TO_NOTHING: f64 = 0.7;
+
+impl Picture {
+    /// The outputs of which the recalibrated simulation explains next to nothing in a recording that it was fitted to, each with the share (rms about the
+    /// mean) that it leaves.
+    pub fn unexplained(&self) -> Vec<(&str, f64)> {
+        let mut found: Vec<(&str, f64)> = Vec::new();
+        for record in self.records.iter().filter(|r| r.role == Role::Estimation) {
+            let share = record.left();
+            let listed = found.iter().any(|(output, _)| *output == record.output);
+            if share > NEXT_TO_NOTHING && !listed {
+                found.push((&record.output, share));
+            }
+        }
+        found
+    }
+}
+
 /// One output of one recording over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordPicture {
@@ -50,6 +69,17 @@ pub struct RecordPicture {
     pub noise_rms: f64,
     /// Samples from one entry to the next: more than one where an entry is a mean over so many.
     pub every: usize,
+}
+
+impl RecordPicture {
+    /// The share of what was recorded (rms about its mean) that the recalibrated simulation leaves; `NaN` where nothing was both recorded and simulated.
+    fn left(&self) -> f64 {
+        let both = self.measured.iter().zip(&self.before).filter(|(y, s)| y.is_finite() && s.is_finite());
+        let both: Vec<(f64, f64)> = both.map(|(y, s)| (*y, *s)).collect();
+        let mean = both.iter().map(|(y, _)| y).sum::<f64>() / both.len() as f64;
+        let squares = |of: &dyn Fn(f64, f64) -> f64| both.iter().map(|&(y, s)| of(y, s).powi(2)).sum::<f64>();
+        (squares(&|y, s| y - s) / squares(&|y, _| y - mean)).sqrt()
+    }
 }
 
 /// What a recording was used for.
@@ -127,4 +157,41 @@ pub struct ParameterPicture {
     pub after: Option<Interval>,
     /// A remark, such as that it lies at a bound.
     pub remark: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(role: Role, before: Vec<f64>) -> RecordPicture {
+        RecordPicture {
+            recording: "est.csv".into(),
+            output: "x_m".into(),
+            unit: "m".into(),
+            role,
+            place: 0,
+            samples: (0..4).collect(),
+            scored: vec![false; 4],
+            time_s: vec![0.0, 1.0, 2.0, 3.0],
+            measured: vec![11.0, 9.0, 11.0, f64::NAN],
+            before,
+            after: None,
+            noise_rms: 0.1,
+            every: 1,
+        }
+    }
+
+    #[test]
+    fn a_mean_explains_nothing_and_the_hold_out_is_not_asked() {
+        let shares = |role, before: [f64; 4]| -> Vec<f64> {
+            let picture = Picture { records: vec![record(role, before.to_vec())], ..Picture::default() };
+            picture.unexplained().iter().map(|(_, share)| *share).collect()
+        };
+        let mean = 31.0 / 3.0;
+        let left = shares(Role::Estimation, [mean; 4]);
+        assert!(left.len() == 1 && (left[0] - 1.0).abs() < 1e-12, "{left:?}");
+        assert!(shares(Role::Estimation, [10.9, 9.1, 11.0, 3.0]).is_empty());
+        assert!(shares(Role::HoldOut, [mean; 4]).is_empty());
+        assert!(shares(Role::Estimation, [f64::NAN; 4]).is_empty(), "nothing was simulated");
+    }
 }

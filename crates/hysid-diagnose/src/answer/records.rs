@@ -52,24 +52,28 @@ pub fn from_moment(effects: &[EffectRecord], data: &DataSet) -> Option<[f64; 2]>
     Some([moment.value, last.start_s + last.len() as f64 * data.period_s])
 }
 
-/// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it.
+/// Rival explanations: for each effect that is not in the winning set, the likeliest set that has it, and the probability of all that have it. A set that says
+/// what the winner says and more is no rival of it, and counts for nothing but what it shares with it.
 pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<AlternativeRecord> {
     let Contest { pool, weighed, probability, winner } = *contest;
     let mut out: Vec<AlternativeRecord> = Vec::new();
     let mut order: Vec<usize> = (0..pool.len()).collect();
     order.sort_by(|&a, &b| weighed[b].log_evidence.total_cmp(&weighed[a].log_evidence));
+    let says_more: Vec<bool> = weighed.iter().map(|w| w.says_more_than(&weighed[winner])).collect();
     for i in order {
         for e in &pool[i].effects {
             let winning = pool[winner].effects.iter().any(|w| w.states_the_same(e));
+            if says_more[i] && !winning {
+                continue;
+            }
             let listed = out.iter().any(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
             if listed || (winning && kind != VerdictKind::Ambiguous) {
                 continue;
             }
-            let total: f64 = weighed
-                .iter()
-                .zip(probability)
-                .filter(|(w, _)| w.claims.iter().any(|c| c.mechanism == e.mechanism.id && c.slot == e.slot.label))
-                .map(|(_, p)| p)
+            let total: f64 = (weighed.iter().zip(probability).zip(&says_more))
+                .filter(|(_, more)| winning || !**more)
+                .filter(|((w, _), _)| w.claims.iter().any(|c| c.mechanism == e.mechanism.id && c.slot == e.slot.label))
+                .map(|((_, p), _)| p)
                 .sum();
             out.push(AlternativeRecord {
                 mechanism: e.mechanism.id.into(),
@@ -279,6 +283,16 @@ pub fn summary(file: &DiagnosisFile, varying: Option<&str>, unequal: Option<&str
             }
         },
     }
+}
+
+/// The verdict that nothing is missing where the simulation explains next to nothing of these outputs, each with the share that it leaves; `None` where there
+/// is no such output.
+pub fn without_mismatch(unexplained: &[(&str, f64)]) -> Option<String> {
+    let told: Vec<String> =
+        unexplained.iter().map(|(output, share)| format!("{:.0} % of `{output}`", 100.0 * share)).collect();
+    (!told.is_empty()).then(|| {
+        format!("The recalibrated simulation leaves {}: it explains next to nothing of it, and no mechanism of the catalogue is told from noise there.", told.join(" and "))
+    })
 }
 
 /// What became of the sets that the caller wanted weighed.

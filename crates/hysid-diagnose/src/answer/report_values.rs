@@ -4,7 +4,7 @@ use hysid_plant::{ClockSource, Compiled, Drive, Expr, Input, Output, Run, Simula
 
 use crate::file::{ParameterRecord, finite};
 use crate::mechanism::Value;
-use crate::model::base::Base;
+use crate::model::base::{Base, Interval, QUANTILE};
 use crate::model::hypothesis::Effect;
 
 /// Values of expressions of parameters only.
@@ -36,8 +36,8 @@ fn evaluate(document: &Simulation, expressions: &[Expr], theta: &[Vec<f64>]) -> 
     )
 }
 
-/// The reported parameters of one effect of a fitted simulation, with 95 % intervals by the delta method; none where no unknown of the fit moves a
-/// value.
+/// The reported parameters of one effect of a fitted simulation, with 95 % intervals: that of the unknown where a value is one, by the delta method where it
+/// is made of several; none where no unknown of the fit moves a value.
 pub fn reported(base: &Base<'_>, effect: &Effect) -> Vec<ParameterRecord> {
     let document = base.document();
     let expressions: Vec<Expr> = effect.written.report.iter().map(|r| r.value.clone()).collect();
@@ -61,6 +61,7 @@ pub fn reported(base: &Base<'_>, effect: &Effect) -> Vec<ParameterRecord> {
         }
     }
     let Some(table) = evaluate(&document, &expressions, &points) else { return Vec::new() };
+    let intervals = base.intervals();
     effect
         .written
         .report
@@ -78,13 +79,18 @@ pub fn reported(base: &Base<'_>, effect: &Effect) -> Vec<ParameterRecord> {
             }
             // What no unknown moves was read from the recording or chosen from a grid: nothing tells how well it is known.
             // Nor does anything where all that moves it stands at a bound.
-            let half = 1.96 * variance.sqrt();
+            let half = QUANTILE * variance.sqrt();
             let end = |x: f64| finite(x).filter(|_| variance > 0.0);
+            let of_itself = match &expressions[e] {
+                Expr::Symbol(name) => intervals.iter().find(|i| i.name == *name),
+                _ => None,
+            };
+            let (low, high) = of_itself.map_or((Some(value - half), Some(value + half)), Interval::low_and_high);
             ParameterRecord {
                 name: r.name.clone(),
                 value,
-                low: end(value - half),
-                high: end(value + half),
+                low: low.and_then(end),
+                high: high.and_then(end),
                 unit: r.unit.as_ref().map(ToString::to_string).unwrap_or_default(),
             }
         })

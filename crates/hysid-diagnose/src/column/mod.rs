@@ -182,9 +182,8 @@ impl StandIn {
                 ))
             })
             .collect();
-        (!parts.is_empty()).then(|| {
-            format!("Parameters of the simulator are not those of the recording: {}. This is a parameter error, no missing physics.", parts.join(", "))
-        })
+        (!parts.is_empty())
+            .then(|| format!("Parameters of the simulator are not those of the recording: {}.", parts.join(", ")))
     }
 }
 

@@ -94,6 +94,7 @@ impl DataSet {
                 });
             }
             let missing = y.iter().flat_map(|c| c.iter()).filter(|v| !v.is_finite()).count();
+            let unknown = (0..r.len()).filter(|&i| u.iter().any(|c| !c[i].is_finite())).count();
             let cut = stretches.len() - before;
             let found: usize = stretches[before..].iter().map(rows_in_runs).sum();
             if found < needed {
@@ -107,9 +108,10 @@ impl DataSet {
             }
             if cut > 1 || dropped > 0 || missing > 0 {
                 notes.push(format!(
-                    "{}: used in {cut} stretch{} because samples are missing ({missing} missing output values; {dropped} samples in stretches that are too short)",
+                    "{}: used in {cut} stretch{} because samples are missing ({} without an input value, which cut it; {missing} output values that are missing, of which each is left out by itself; {dropped} samples in stretches that are too short)",
                     r.name(),
                     if cut == 1 { "" } else { "es" },
+                    unknown,
                 ));
             }
         }

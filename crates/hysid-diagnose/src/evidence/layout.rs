@@ -140,6 +140,11 @@ impl Whitener {
         self.models.iter().all(|m| m.coefficients() == 0)
     }
 
+    /// Whether an output's noise is that of an unknown force through the plant.
+    pub fn is_driven(&self) -> bool {
+        self.models.iter().any(NoiseModel::is_driven)
+    }
+
     /// The largest order.
     pub fn order(&self) -> usize {
         self.models.iter().map(NoiseModel::order).max().unwrap_or(0)

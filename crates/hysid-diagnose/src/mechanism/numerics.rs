@@ -55,8 +55,8 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
         Hold::Zero => Hold::Linear,
     };
     let what = match held.time.hold {
-        Hold::Zero => "inputs held between samples",
-        Hold::Linear => "inputs interpolated between samples",
+        Hold::Zero => "it interpolates inputs that are held between samples",
+        Hold::Linear => "it holds inputs that go on between samples",
     };
     let mut found = vec![Variant { what, simulation: held }];
     let half = Expr::Number(period_s / 2.0);

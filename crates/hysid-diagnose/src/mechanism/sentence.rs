@@ -108,7 +108,15 @@ mod tests {
             let value = |name: &str, value: f64| Value { name: name.to_owned(), value, unit: None };
             friction.tell(&slot, &[value("F_c", 3.0), value("F_d", at_rest), value("v_s", 0.5)])
         };
-        assert!(told(2.0).ends_with("is 2 larger at rest than when sliding and falls over 0.5."), "{}", told(2.0));
-        assert!(told(-2.0).ends_with("is 2 smaller at rest than when sliding and grows over 0.5."), "{}", told(-2.0));
+        assert!(
+            told(2.0).ends_with(", 3 at speed, is 2 larger at rest than when sliding and falls over 0.5."),
+            "{}",
+            told(2.0)
+        );
+        assert!(
+            told(-2.0).ends_with(", 3 at speed, is 2 smaller at rest than when sliding and grows over 0.5."),
+            "{}",
+            told(-2.0)
+        );
     }
 }

@@ -7,7 +7,7 @@ use hysid_plant::Simulation;
 use super::force::force_paths;
 use super::{Count, Model, Values};
 use crate::data::DataSet;
-use crate::evidence::{ForcePath, NoiseModel, Projector, Whitener, norm2};
+use crate::evidence::{ForcePath, Projector, Whitener, norm2};
 use crate::refit::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};
 
 /// Largest order of the noise models.
@@ -188,7 +188,7 @@ impl Base<'_> {
 
     /// Whether the noise of an output is that of an unknown force through the plant.
     pub fn driven(&self) -> bool {
-        self.whitener.models.iter().any(NoiseModel::is_driven)
+        self.whitener.is_driven()
     }
 
     /// Whether the simulation is so far from the recording that its parameters say little.

@@ -9,9 +9,10 @@ use crate::budget::Budget;
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Amplitudes, Mechanism, Places, Purpose, Rewritten, Shape};
-use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
+use crate::model::base::{Base, MAX_AR, NoiseKind, Start, fit_simulation};
+use crate::model::force::force_paths;
 use crate::model::{Count, Model, Values};
-use crate::refit::{Held, LmOptions, go_on};
+use crate::refit::{Held, LmOptions, Problem, go_on};
 use crate::slot::Slot;
 
 /// An effect of a hypothesis.
@@ -199,6 +200,15 @@ impl<'d> Setting<'d> {
         iterations: usize,
     ) -> Option<Base<'d>> {
         self.fit_from(document, Start::Values(start), noise, rounds, iterations)
+    }
+
+    /// The noise of what a document leaves at these values.
+    pub fn noise_at(&self, document: &Simulation, values: &Values) -> Option<Whitener> {
+        let model = Model::new(document, self.data, self.substeps).ok()?;
+        let theta = model.theta(values);
+        let residual = model.residual(&theta)?;
+        let paths = force_paths(&model, &theta, &self.pushed);
+        Some(self.data.layout.fit_noise(&residual, MAX_AR, &paths))
     }
 
     /// Goes on with a fitted document; the noise model is that given, then its own.

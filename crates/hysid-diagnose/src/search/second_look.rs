@@ -56,7 +56,8 @@ impl<'d> Search<'_, 'd> {
     /// there are as many sets as can be made of the candidates, and sets of one size that say nearly the same (a dead zone before or behind a valve)
     /// stand together. That the noise model is an estimate is allowed for by [`ODDS_AGAINST`], but not
     /// where a set turns a coloured residual into a white one: there the simulation as it is has the best colour that could be found for it, and the set
-    /// has none to choose. What changes at an end of the recording may be how it began (a play that the simulation has, and that an earlier input moved).
+    /// has none to choose. A random force has one colour and no choice of it, and a straight line whitens the walk of what integrates. What changes at an
+    /// end of the recording may be how it began (a play that the simulation has, and that an earlier input moved).
     pub fn by_chance(&self, start: &Hypothesis<'d>, fitted: &[Hypothesis<'d>], candidates: usize) -> Option<f64> {
         let fitted: Vec<&Hypothesis<'d>> = fitted.iter().collect();
         let (p, best) = self.likeliest(start, &fitted, candidates)?;
@@ -85,7 +86,8 @@ impl<'d> Search<'_, 'd> {
             h.log_evidence + spared_by(h) - if slow { SLOW } else { 0.0 }
         };
         let none = start.log_evidence + spared_by(start);
-        let whitens = |h: &Hypothesis<'_>| !start.base.whitener.is_white() && h.base.whitener.is_white();
+        let coloured = !start.base.whitener.is_white() && !start.base.driven();
+        let whitens = |h: &Hypothesis<'_>| coloured && h.base.whitener.is_white();
         let odds = |h: &Hypothesis<'_>| if whitens(h) { 1.0 } else { ODDS_AGAINST };
         let bound = |h: &Hypothesis<'_>| odds(h) * sets(h) * (none - evidence(h)).exp();
         let fitted = || fitted.iter().copied().filter(|h| !h.effects.iter().any(|e| h.changes_at_an_end(e)));

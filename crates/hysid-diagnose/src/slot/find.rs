@@ -296,7 +296,10 @@ impl Finder<'_> {
                 slot.offer(self.simulation, "v", Expr::symbol(current));
             } else if let Some(motion) = of_a_part.or(self.motions.first()) {
                 self.offer_motion(&mut slot, motion);
-                self.offer_heat(&mut slot, motion, name);
+                match self.slip(name) {
+                    Some(slip) => slot.offer(self.simulation, "v", slip),
+                    None => self.offer_heat(&mut slot, motion, name),
+                }
             } else if let Some(law) = self.force_laws().first() {
                 for symbol in ["v", "x"] {
                     if let Some(q) = law.quantity(symbol) {

@@ -1,13 +1,46 @@
-//! The power that a moving part dissipates: of the terms of its equation those that its own velocity makes, times that velocity.
+//! The power that a moving part dissipates: of the terms of its equation those that its own velocity makes, times that velocity; and the slip at which a damper
+//! between two parts does.
 
 use hysid_plant::Expr;
 
 use super::Slot;
-use super::algebra::product;
+use super::algebra::{coefficient, only_parameters, product};
 use super::find::Finder;
-use super::motion::{Motion, force_of};
+use super::motion::{Kinematic, Motion, force_of};
+use super::pattern::factors;
 
 impl Finder<'_> {
+    /// The difference of the velocities of two ends that a parameter multiplies, as `n_in - n` in `c*(n_in - n)`: what a coupling between them dissipates goes by
+    /// that. `None` where the parameter multiplies none, or more than one.
+    pub(super) fn slip(&self, parameter: &str) -> Option<Expr> {
+        let moves =
+            |name: &str| self.motions.iter().any(|m| m.v == name) || self.kinematic_input(name) == Kinematic::Velocity;
+        let is_end = |term: &Expr| {
+            let mut symbols =
+                term.symbols().into_iter().filter(|s| s != "pi" && self.simulation.parameter(s).is_none());
+            symbols.next().is_some_and(|s| moves(&s)) && symbols.next().is_none()
+        };
+        let is_slip =
+            |e: &Expr| matches!(e.terms()[..], [(a, one), (b, other)] if a * b < 0.0 && is_end(one) && is_end(other));
+        // In each equation it may multiply nothing else.
+        let multiplied = |motion: &Motion<'_>| {
+            let all = coefficient(motion.derivative, parameter)?;
+            let (slips, others): (Vec<&Expr>, Vec<&Expr>) = factors(&all).into_iter().partition(|f| is_slip(f));
+            let [slip] = slips[..] else { return None };
+            others.into_iter().all(|f| only_parameters(self.simulation, f)).then(|| slip.clone())
+        };
+        let parts = self.motions.iter().filter(|m| m.derivative.uses(parameter));
+        let found: Vec<Expr> = parts.map(multiplied).collect::<Option<_>>()?;
+        // From either end it is the same.
+        let ends = |e: &Expr| {
+            let mut ends: Vec<String> = e.terms().into_iter().map(|(_, end)| end.to_string()).collect();
+            ends.sort_unstable();
+            ends
+        };
+        let first = found.first()?;
+        found.iter().all(|e| ends(e) == ends(first)).then(|| first.clone())
+    }
+
     /// Offers what a part dissipates by all of its terms as `heat`; of one term alone nothing, since its power is the speed or its square. Nothing either where
     /// this parameter stands beside another velocity: what a damper between two parts dissipates is not told by one of them.
     pub(super) fn offer_heat(&self, slot: &mut Slot, motion: &Motion<'_>, parameter: &str) {
@@ -61,6 +94,28 @@ mod tests {
             "(u - b*(w - r) - 0.2*w*F - F*sign(w))/J",
             [Some("0.2*w*F*w + F*sign(w)*w"), Some("0.2*w*F*w + F*sign(w)*w"), None],
         );
+    }
+
+    #[test]
+    fn a_coupling_is_heated_by_its_slip() {
+        let rate = |unit: &str, clutch: &str, hub: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nn_in = \"shaft_{unit}\"\n[parameters]\nJ = {{ value = 0.4, min = 0.1, unit = \"kg m^2\" }}\n\
+                 c = {{ value = 0.3, min = 0.1, unit = \"N m s/rad\" }}\n[states]\n\
+                 n = {{ derivative = \"(30/pi)*({clutch} - 0.1*n^2)/J\", initial = 0.0 }}\nr = {{ derivative = \"({hub} - 0.2*r)/J\", initial = 0.0 }}\n\
+                 [outputs]\nfan_rpm = \"n\"\nhub_rad_s = \"r\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "clutch.sim.toml").unwrap()).slots;
+            let slot = slots.iter().find(|s| s.label == "parameter:c").unwrap();
+            slot.quantity("v").map(|q| q.expression.to_string())
+        };
+        assert_eq!(rate("rpm", "c*(n_in - n)*pi/30", "1").as_deref(), Some("n_in - n"));
+        // Seen from the other end.
+        assert_eq!(rate("rpm", "c*(r - n)", "c*(n - r)").as_deref(), Some("r - n"));
+        // Two couplings of one parameter, one to a wall, what is no velocity.
+        assert_eq!(rate("rpm", "c*(n_in - n)", "c*(n - r)").as_deref(), Some("n"));
+        assert_eq!(rate("rpm", "c*(1 - n)", "1").as_deref(), Some("n"));
+        assert_eq!(rate("bar", "c*(n_in - n)", "1").as_deref(), Some("n"));
     }
 
     #[test]

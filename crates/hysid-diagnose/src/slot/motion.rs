@@ -4,6 +4,7 @@ use hysid_plant::{BinaryOp, Expr, Simulation, State, Unit};
 
 use super::algebra::{constant_coefficient, only_parameters};
 use super::find::{has_unit, is_one_of};
+use super::pattern::factors;
 use super::turn::{is_rate_of_turn, is_turn};
 
 /// How forces enter the derivative of a velocity.
@@ -138,6 +139,38 @@ fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Ex
     constant_coefficient(simulation, &position.derivative, velocity)
 }
 
+/// Units of what a mass holds of its velocity.
+const MOMENTA: &[&str] = &["kg m/s", "kg m^2/s"];
+/// Units of masses.
+const MASSES: &[&str] = &["kg", "kg m^2"];
+
+/// The unit of a state; where it has none, that of an output which shows the state as it is.
+pub(super) fn shown_unit(simulation: &Simulation, state: &str) -> Option<Unit> {
+    simulation.unit_of(state).or_else(|| {
+        let shown = simulation.outputs.iter().find(|o| o.expression == Expr::symbol(state));
+        shown.and_then(|o| Unit::of_column(&o.column))
+    })
+}
+
+/// Whether a state is the momentum of a part: by its unit, and where it has none by the masses that divide it.
+fn is_momentum(simulation: &Simulation, state: &State) -> bool {
+    if let Some(unit) = simulation.unit_of(&state.name) {
+        return is_one_of(&unit, MOMENTA);
+    }
+    let (mut divided, mut otherwise) = (0, 0);
+    let by_a_mass = |above: &Expr, below: &Expr| {
+        factors(above).contains(&&Expr::symbol(&state.name)) && has_unit(simulation.unit_of_expr(below), MASSES)
+    };
+    for (_, e) in simulation.expressions() {
+        e.visit(&mut |e| match e {
+            Expr::Binary(BinaryOp::Div, above, below) if by_a_mass(above, below) => divided += 1,
+            Expr::Symbol(name) => otherwise += usize::from(*name == state.name),
+            _ => {}
+        });
+    }
+    divided > 0 && otherwise == divided
+}
+
 pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> Vec<Motion<'a>> {
     let of_the_user = |s: &&State| original.state(&s.name).is_some();
     let (turns, others): (Vec<&State>, Vec<&State>) =
@@ -152,7 +185,9 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
             None => known().find_map(|s| Some((s, scaled(&s)?))).unzip(),
         };
         let passes_on = matches!(&velocity.derivative, Expr::Symbol(s) if original.state(s).is_some());
-        let alone = kinematic(velocity.unit.as_ref(), &velocity.name) == Kinematic::Velocity;
+        let unit = shown_unit(simulation, &velocity.name);
+        let alone =
+            kinematic(unit.as_ref(), &velocity.name) == Kinematic::Velocity || is_momentum(simulation, velocity);
         if passes_on || !(position.is_some() || alone) {
             continue;
         }
@@ -171,4 +206,29 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
         });
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_momentum_is_told_by_its_unit_or_its_mass_and_a_speed_by_what_shows_it() {
+        let found = |p: &str, unit: &str, torque: &str, n: &str, output: &str| -> Vec<String> {
+            let unit = if unit.is_empty() { String::new() } else { format!(", unit = \"{unit}\"") };
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nT = \"T_Nm\"\n[parameters]\nJ = {{ value = 1.0, min = 0.1, unit = \"kg m^2\" }}\n\
+                 C = {{ value = 1.0, min = 0.1 }}\n[states]\n{p} = {{ derivative = \"{torque}\", initial = 0.0{unit} }}\n\
+                 s = {{ derivative = \"(T - {n})/C\", initial = 0.0 }}\n[outputs]\n{output} = \"s\"\n"
+            );
+            let simulation = Simulation::parse(&text, "drive.sim.toml").unwrap();
+            motions(&simulation, &simulation).iter().map(|m| m.v.to_owned()).collect()
+        };
+        assert_eq!(found("p", "kg m^2/s", "T - C*p/J", "s", "level"), ["p"]);
+        assert_eq!(found("p", "", "T - C*p/J", "p/J", "level"), ["p"]);
+        assert!(found("p", "", "T - C*p/J", "p", "level").is_empty(), "it stands somewhere without its mass");
+        assert!(found("p", "", "T - C*p/C", "s", "level").is_empty());
+        assert!(found("p", "m^3", "T - C*p/J", "s", "level").is_empty());
+        assert_eq!(found("p", "m^3", "T - C*p/J", "s", "fan_rpm"), ["s"]);
+    }
 }

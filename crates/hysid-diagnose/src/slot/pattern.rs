@@ -129,7 +129,7 @@ pub(super) fn step_in(expr: &Expr, symbol: &str) -> Option<Expr> {
 }
 
 /// The factors above the line of a product.
-fn factors(expr: &Expr) -> Vec<&Expr> {
+pub(super) fn factors(expr: &Expr) -> Vec<&Expr> {
     match expr {
         Expr::Binary(BinaryOp::Mul, a, b) => factors(a).into_iter().chain(factors(b)).collect(),
         Expr::Binary(BinaryOp::Div, a, _) | Expr::Neg(a) => factors(a),

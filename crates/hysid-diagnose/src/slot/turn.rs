@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use hysid_plant::{Expr, Initial, Simulation, State, Unit};
 
-use super::motion::motions;
+use super::motion::{motions, shown_unit};
 
 /// What the names of such states begin with.
 const TURN: &str = "turn";
@@ -33,7 +33,7 @@ pub(super) fn is_rate_of_turn(unit: &Unit) -> bool {
 pub(crate) fn with_turns(simulation: &Simulation) -> Simulation {
     let mut out = simulation.clone();
     for motion in motions(simulation, simulation).iter().filter(|m| m.x.is_none()) {
-        let Some(factor) = simulation.unit_of(motion.v).as_ref().and_then(radians_per_second) else { continue };
+        let Some(factor) = shown_unit(simulation, motion.v).as_ref().and_then(radians_per_second) else { continue };
         let speed = Expr::symbol(motion.v);
         let derivative = if factor == 1.0 { speed } else { Expr::Number(factor) * speed };
         let (name, unit) = (out.fresh_symbol(TURN), Unit::parse("rad").ok());

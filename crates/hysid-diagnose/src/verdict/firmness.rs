@@ -51,7 +51,8 @@ pub fn firmness(
         let of_turned_noise = own.adds_what_noise_does() && beside("rectified_output");
         // What rounding leaves is neither white nor normal: a change by 0.12 % was firm beside it (report of seed 2383, 0010).
         let of_rounding = beside("quantisation");
-        let of_plays = !own.members_imitate() && !plays.is_empty() && brings_little(pool, winner, i);
+        // A sum of plays beside a law that explains nearly all follows what the form of that law leaves, as well as a play that is there.
+        let of_plays = !plays.is_empty() && best.effects.len() > 1 && brings_little(pool, winner, i);
         // A loop with unequal sides is a sum of plays and a curve: a curve at the same signal may be what another law of such loops has in one.
         let of_a_loop = own == Family::InputNonlinearity && plays.iter().any(|o| o.slot.label == e.slot.label);
         // Plays of an input that is counted from elsewhere are those of the input and a constant: about what a loop is centred belongs to its law.

@@ -52,13 +52,15 @@ pub struct Judgement<'d> {
 
 /// Probability above which something wanders in the place of an effect rather than not.
 const LIKELY: f64 = 0.5;
+/// Share of the level below which a mismatch must be that no set and no generic term supports.
+const UNSUPPORTED: f64 = 0.5;
 /// Share of the log evidence that the members which do not wander must bring by themselves to be written without the others.
 const STEADY: f64 = 0.5;
 
 impl<'d> Judgement<'d> {
     /// Of what a search found.
     pub fn of(found: &Explored<'_, 'd>) -> Self {
-        let Explored { search, pool, candidates, significant, shown, least, .. } = found;
+        let Explored { search, pool, candidates, significant, shown, p_value, least, .. } = found;
         let (setting, significant) = (&search.setting, *significant);
         let unfinished = || setting.budget.unfinished();
         let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
@@ -130,9 +132,10 @@ impl<'d> Judgement<'d> {
             support.iter_mut().for_each(Support::weaken);
         }
         let mut kind = if outside && !unfinished() && !runs_away { VerdictKind::NotInCatalogue } else { within };
-        // What is significant stays so, though no set outweighs its price: the likeliest is told, neither believed nor written.
+        // What is significant stays so, though no set outweighs its price: the likeliest is told, neither believed nor written. The level is shared by surrogates
+        // and sets, so that what only the surrogates see must be below half of it.
         let mut told = if runs_away { 0 } else { winner };
-        if significant && kind == VerdictKind::NoSignificantMismatch {
+        if significant && *p_value < UNSUPPORTED * search.options.alpha && kind == VerdictKind::NoSignificantMismatch {
             kind = VerdictKind::Ambiguous;
             if let Some(likeliest) = likeliest(&weighed).filter(|_| !runs_away) {
                 told = likeliest;

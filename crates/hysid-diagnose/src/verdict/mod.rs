@@ -44,6 +44,14 @@ pub struct Hypothesis {
     pub log_evidence: f64,
 }
 
+impl Hypothesis {
+    /// Whether it claims all that another one does, which claims something, and more.
+    pub fn says_more_than(&self, other: &Self) -> bool {
+        let claims = other.claims.len();
+        claims > 0 && self.claims.len() > claims && other.claims.iter().all(|c| self.claims.contains(c))
+    }
+}
+
 /// Probabilities proportional to `exp(weight * log evidence)`, in the order of the evidences.
 pub fn probabilities(log_evidence: &[f64], weight: f64) -> Vec<f64> {
     let top = log_evidence.iter().copied().filter(|e| e.is_finite()).fold(f64::NEG_INFINITY, f64::max);
@@ -148,6 +156,20 @@ mod tests {
             assert_eq!(kind, expected, "{rivals:?} {s:?}");
         }
         assert_eq!(verdict(&[]), VerdictKind::NoSignificantMismatch);
+    }
+
+    #[test]
+    fn a_set_says_more_than_one_that_it_contains() {
+        let set = |members: &[(&'static str, &'static str)]| Hypothesis {
+            claims: members.iter().map(|(m, f)| claim(m, f)).collect(),
+            log_evidence: 0.0,
+        };
+        let (overflow, delay) = (("overflow", "overflow"), ("delay", "signal_path_lag"));
+        let limit = ("output_saturation", "sensor_range");
+        let (told, more) = (set(&[overflow, delay]), set(&[delay, limit, overflow]));
+        assert!(more.says_more_than(&told) && !told.says_more_than(&more) && !told.says_more_than(&told));
+        assert!(!set(&[delay, limit, limit]).says_more_than(&told), "it lacks one");
+        assert!(!told.says_more_than(&set(&[])), "nothing is told");
     }
 
     #[test]

@@ -66,9 +66,14 @@ pub(crate) fn recalibrate(file: &mut DiagnosisFile) {
     if !rivals.is_finite() {
         return;
     }
-    for a in &mut file.alternatives {
+    let elsewhere: Vec<bool> = (file.alternatives.iter())
+        .map(|a| file.alternatives.iter().any(|o| o.mechanism == a.mechanism && o.slot != a.slot))
+        .collect();
+    for (a, elsewhere) in file.alternatives.iter_mut().zip(elsewhere) {
         let own = file.effects.iter().find(|e| e.mechanism == a.mechanism && e.slot == a.slot);
         a.probability = match own {
+            // An effect that nothing else than its place can be told of has one probability.
+            Some(e) if !elsewhere => e.probability,
             Some(e) if e.support < FIRM => {
                 (a.probability * e.probability / e.support.max(f64::MIN_POSITIVE)).min(e.probability)
             }

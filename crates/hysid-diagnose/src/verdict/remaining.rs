@@ -7,6 +7,7 @@ use crate::budget::Step;
 use crate::evidence::SurrogateTest;
 use crate::evidence::better_by_chance;
 use crate::file::{CorrectionRecord, RemainingRecord, finite};
+use crate::model::base::{Base, MAX_AR};
 use crate::model::hypothesis::{Hypothesis, block_score};
 use crate::openset::needed::{Refitted, fitted};
 use crate::openset::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
@@ -247,9 +248,13 @@ fn in_place<'d>(
     }
 }
 
-/// The noise that the best model leaves, by output.
+/// The noise that the best model leaves, by output: what cannot be told of its residual from its own past. Plain squares take all of the residual for noise,
+/// however smooth it is.
 fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {
-    best.base.whitener.models.iter().map(|m| m.innovation().min(m.noise_rms())).collect()
+    let Base { model, fit, whitener, .. } = &best.base;
+    let coloured = whitener.is_white().then(|| model.data().layout.fit_noise(&fit.residual, MAX_AR, &[]));
+    let models = &coloured.as_ref().unwrap_or(whitener).models;
+    models.iter().map(|m| m.innovation().min(m.noise_rms())).collect()
 }
 
 /// Share of the mismatch, above the noise, that a set leaves.

@@ -10,7 +10,7 @@ mod words;
 
 use hysid_diagnose::Interval;
 use hysid_diagnose::answer::picture::{ParameterPicture, Picture};
-use hysid_diagnose::file::{DiagnosisFile, VerdictKind};
+use hysid_diagnose::file::{AlternativeRecord, DiagnosisFile, VerdictKind};
 
 use crate::page::{Align, Page, Table, Tenor};
 use crate::words::{Provenance, interval, number, p_value, percent, probability};
@@ -26,7 +26,7 @@ pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) ->
         Page::new(format!("Diagnosis: {}", picture.title), words::headline(file), words::told(&file.summary, file));
     merit(&mut page, file);
     effects(&mut page, file);
-    next(&mut page, file);
+    next(&mut page, file, picture);
     fits(&mut page, file);
     page.notes(Tenor::Warning, &file.notes);
     if file.verdict == VerdictKind::NoSignificantMismatch {
@@ -226,7 +226,9 @@ fn candidates(page: &mut Page, file: &DiagnosisFile) {
             concealed,
         ]);
     }
-    for a in file.alternatives.iter().take(MOST_RIVALS) {
+    // What is told has its row already.
+    let told = |a: &&AlternativeRecord| file.effects.iter().any(|e| e.mechanism == a.mechanism && e.slot == a.slot);
+    for a in file.alternatives.iter().filter(|a| !told(a)).take(MOST_RIVALS) {
         table.row([
             words::plain(&a.mechanism),
             words::plain(&a.family),
@@ -360,9 +362,9 @@ fn limits(page: &mut Page, file: &DiagnosisFile) {
     }
 }
 
-fn next(page: &mut Page, file: &DiagnosisFile) {
+fn next(page: &mut Page, file: &DiagnosisFile, picture: &Picture) {
     page.section("What to do next", "");
-    page.text(words::next_step(file));
+    page.text(words::next_step(file, picture));
     let Some(experiment) = &file.experiment else { return };
     page.text(&experiment.sentence);
     if let (Some(expected), Some(present)) = (experiment.expected_separation, experiment.present_separation)

@@ -1,5 +1,6 @@
 //! Words and numbers as people read them.
 
+use hysid_diagnose::answer::picture::Picture;
 use hysid_diagnose::file::{DiagnosisFile, VerdictKind};
 
 /// An identifier of the file format as words.
@@ -43,8 +44,11 @@ pub(super) fn told(text: &str, file: &DiagnosisFile) -> String {
 }
 
 /// What an engineer does with this verdict.
-pub(super) fn next_step(file: &DiagnosisFile) -> &'static str {
+pub(super) fn next_step(file: &DiagnosisFile, picture: &Picture) -> &'static str {
     match file.verdict {
+        VerdictKind::NoSignificantMismatch if !picture.unexplained().is_empty() => {
+            "Do not keep this simulation: it does not follow the recording. Look whether the columns, the units and the input are those that it is meant for, and whether the input that moves this machine was recorded."
+        }
         VerdictKind::NoSignificantMismatch if file.fit.iter().any(|f| f.outdone().is_some()) => {
             "Do not trust this verdict: a model without physics predicts the hold-out far better than the simulation. Look at the residual below, and record the same input twice: what repeats is no noise."
         }
@@ -58,7 +62,11 @@ pub(super) fn next_step(file: &DiagnosisFile) -> &'static str {
             "The kind of effect is certain, its exact law is not. augmented.sim.toml holds the likeliest law; on recordings like these its siblings would do as well."
         }
         VerdictKind::Ambiguous => {
-            "Do not build any of these into the simulation yet. Record again in the way proposed here, where there is a proposal, and diagnose both recordings together."
+            if file.experiment.is_some() {
+                "Do not take any of these for the physics yet: an augmented simulation, where one is written, predicts recordings like these. Record again in the way proposed here, and diagnose both recordings together."
+            } else {
+                "Do not take any of these for the physics yet: an augmented simulation, where one is written, predicts recordings like these. Another recording, of larger motion or in another band, may tell more; diagnose both together."
+            }
         }
         VerdictKind::NotInCatalogue if file.fit.iter().all(|f| f.ratio.is_none()) => {
             "Look for physics at the place named below. No simulation is written: nothing that was found can be trusted on another recording."

@@ -94,18 +94,30 @@ pub fn score(file: &mut DiagnosisFile, models: Models, picture: &Picture, simula
             }
         }
     }
-    if file.verdict == VerdictKind::NoSignificantMismatch {
-        file.notes.extend(file.fit.iter().filter_map(contradicted));
+    let nothing = file.verdict == VerdictKind::NoSignificantMismatch;
+    let told: Vec<String> = file.fit.iter().filter_map(|fit| contradicted(fit, nothing)).collect();
+    if nothing && !told.is_empty() {
+        file.summary = "No mechanism of the catalogue is told from noise, but a model without physics predicts the hold-out far better than the recalibrated simulation: something is missing.".into();
     }
+    file.notes.extend(told);
 }
 
-/// What speaks against a verdict that nothing is missing. The verdict stays, since the hold-out decides nothing.
-fn contradicted(fit: &FitRecord) -> Option<String> {
-    let share = fit.outdone()?;
-    Some(format!(
-        "on {} a black box leaves {share:.2} of the simulation's error of `{}`: something is missing after all, which no mechanism of the catalogue explains and which passed for noise on the recordings for estimation",
-        fit.recording, fit.output
-    ))
+/// What speaks against a verdict that nothing is missing, or that what is told is all. The verdict stays, since the hold-out decides nothing.
+fn contradicted(fit: &FitRecord, nothing: bool) -> Option<String> {
+    let (share, FitRecord { recording, output, .. }) = (fit.outdone()?, fit);
+    Some(if nothing {
+        format!(
+            "on {recording} a black box leaves {share:.2} of the simulation's error of `{output}`: something is missing after all, which no mechanism of the catalogue explains and which passed for noise on the recordings for estimation"
+        )
+    } else if fit.rmse_after.is_some() {
+        format!(
+            "on {recording} a black box leaves {share:.2} of the augmented simulation's error of `{output}`: more is missing than what was found"
+        )
+    } else {
+        format!(
+            "on {recording} a black box leaves {share:.2} of the simulation's error of `{output}`: that much of it is no noise"
+        )
+    })
 }
 
 /// The model of `hysid fit`, found in a narrower search: linear models decide on rate and lags, then families compete at these lags only.
@@ -283,23 +295,28 @@ mod tests {
 
     #[test]
     fn a_black_box_that_is_far_better_contradicts_the_verdict() {
-        let told = |before: Option<f64>, black_box: Option<f64>| {
-            contradicted(&FitRecord {
+        let told = |before: Option<f64>, after: Option<f64>, black_box: Option<f64>| {
+            let fit = FitRecord {
                 recording: "val.csv".into(),
                 output: "h_m".into(),
                 rmse_before: before,
-                rmse_after: None,
+                rmse_after: after,
                 ratio: None,
                 ratio_low: None,
                 ratio_high: None,
                 rmse_black_box: black_box,
-            })
+            };
+            contradicted(&fit, after.is_none())
         };
-        let words = told(Some(0.056), Some(0.023)).unwrap();
+        let words = told(Some(0.056), None, Some(0.023)).unwrap();
         assert!(words.contains("val.csv") && words.contains("0.41") && words.contains("`h_m`"), "{words}");
-        assert_eq!(told(Some(0.056), Some(0.05)), None);
-        assert_eq!(told(Some(0.056), None), None);
-        assert_eq!(told(None, Some(0.05)), None);
+        assert_eq!(told(Some(0.056), None, Some(0.05)), None);
+        assert_eq!(told(Some(0.056), None, None), None);
+        assert_eq!(told(None, None, Some(0.05)), None);
+        // Beside an effect the augmented simulation is what counts.
+        let words = told(Some(0.4), Some(0.056), Some(0.023)).unwrap();
+        assert!(words.contains("0.41") && words.contains("more is missing"), "{words}");
+        assert_eq!(told(Some(0.4), Some(0.02), Some(0.023)), None);
     }
 
     #[test]

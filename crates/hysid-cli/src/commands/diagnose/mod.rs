@@ -112,7 +112,8 @@ fn work(args: &Args) -> Result<(), Failure> {
             let mut outcome = answer(&stand_in.simulation, column, &intake, &questions, options, &watch)?;
             if let Some(moved) = stand_in.moved(&outcome.file.calibrated_parameters) {
                 if outcome.file.verdict == VerdictKind::NoSignificantMismatch {
-                    outcome.file.summary = format!("{} {moved}", outcome.file.summary);
+                    outcome.file.summary =
+                        format!("{} {moved} This is a parameter error, no missing physics.", outcome.file.summary);
                 } else {
                     outcome.file.notes.insert(0, moved);
                 }

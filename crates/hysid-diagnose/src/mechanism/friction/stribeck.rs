@@ -36,7 +36,7 @@ pub static STRIBECK_FRICTION: Mechanism = Mechanism {
     contains: &["coulomb_friction"],
     confusable: &["coulomb_friction", "cogging"],
     needs: &[Need::Sweeps("v", 6), Need::Slow("v")],
-    sentence: "Dry friction {place} is {|F_d|} {F_d:larger/smaller} at rest than when sliding and {F_d:falls/grows} over {v_s}.",
+    sentence: "Dry friction {place}[, {F_c} at speed,] is {|F_d|} {F_d:larger/smaller} at rest than when sliding and {F_d:falls/grows} over {v_s}.",
     signature: "A falling friction near zero speed: stick-slip, limit cycles.",
     reference: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and compensation methods for the control of machines with friction, Automatica 30 (1994) 1083-1138",
 };
