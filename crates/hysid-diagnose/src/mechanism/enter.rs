@@ -51,9 +51,9 @@ fn sensors<'s>(
     simulation: &'s mut Simulation,
     slot: &'s Slot,
     state: &'s str,
-) -> impl Iterator<Item = (&'s mut Output, Felt, f64)> {
+) -> impl Iterator<Item = (&'s mut Output, &'s Felt, f64)> {
     let sensed = move |o: &Output| slot.sensed.iter().find(|s| s.state == state && s.column == o.column);
-    simulation.outputs.iter_mut().filter_map(move |o| sensed(o).map(|s| (o, s.felt, s.times)))
+    simulation.outputs.iter_mut().filter_map(move |o| sensed(o).map(|s| (o, &s.felt, s.times)))
 }
 
 /// Gives a state another derivative, and to whatever else holds the old one. The outputs that measure it have been seen to.
@@ -148,7 +148,7 @@ pub(super) fn enter(
             let force = writer.text(text)?;
             let resists = if matches!(change, Change::Drive(_)) { -1.0 } else { 1.0 };
             for pull in states {
-                let (name, force) = (&pull.state, pull.of(&force));
+                let (name, whole, force) = (&pull.state, &force, pull.of(&force));
                 let derivative = simulation.state(name).ok_or("the state is gone")?.derivative.clone();
                 let joined = |sum: Expr, part: &Expr| pull.join(sum, part.clone(), resists);
                 let (written, rate) = match force_path(simulation, &derivative) {
@@ -167,6 +167,7 @@ pub(super) fn enter(
                         Felt::Force => {
                             ((Expr::Number(times.abs()) * force.clone()).simplified(), resists * times.signum())
                         }
+                        Felt::Share(share) => ((share.clone() * whole.clone()).simplified(), resists * times.signum()),
                     };
                     output.expression = pull.join(output.expression.clone(), part, resists);
                 }
@@ -190,7 +191,7 @@ pub(super) fn enter(
                     ForcePath::Bare => (derivative.clone() - force.clone()) / (Expr::Number(1.0) + more.clone()),
                 };
                 // A cell that feels what holds the part feels nothing of its inertia.
-                for (output, _, times) in sensors(simulation, slot, name).filter(|(_, felt, _)| *felt == Felt::Rate) {
+                for (output, _, times) in sensors(simulation, slot, name).filter(|(_, felt, _)| **felt == Felt::Rate) {
                     let change = Expr::Number(times) * (written.clone() - derivative.clone());
                     output.expression = output.expression.clone() + change;
                 }

@@ -2,10 +2,11 @@
 
 use hysid_plant::{BinaryOp, Expr};
 
-use super::algebra::{linear_coefficient, quotient, unless_one};
+use super::algebra::{coefficient, linear_coefficient, only_parameters, quotient, unless_one};
 use super::connections::{Stretch, forces_of, signed};
 use super::find::Finder;
 use super::motion::{Motion, force_of};
+use super::sensed::{Felt, Sensed};
 use super::{Pull, Slot, Target};
 
 impl Finder<'_> {
@@ -68,7 +69,59 @@ impl Finder<'_> {
             slot.offer(self.simulation, "k", (-unit).simplified());
             Some(slot)
         };
-        self.motions.iter().filter_map(element).collect()
+        self.motions.iter().filter_map(|one| element(one).or_else(|| self.element_of_a_parameter(one))).collect()
+    }
+
+    /// An element by its stiffness, a parameter that multiplies nothing but the deflection of a part, wherever it stands: what pulls at the coordinates, and what
+    /// sensors feel of it, are its multiples, whatever masses or levers they hold. `None` where one equation tells all of it.
+    fn element_of_a_parameter(&self, one: &Motion<'_>) -> Option<Slot> {
+        let x = one.x?;
+        let stiffness = |name: &str| {
+            let (pulled, mass) = force_of(self.simulation, one.derivative);
+            let own = self.multiple_of(pulled, name, x)?;
+            let above = |multiple: Expr, mass: Option<&Expr>| match mass {
+                Some(mass) => (mass.clone() * multiple).simplified(),
+                None => multiple,
+            };
+            let (true, lever) = signed(above(own, mass)) else { return None };
+            let mut pulls = vec![Pull { lever: unless_one(lever.clone()), ..Pull::new(one.state, 1.0) }];
+            let mut felt = Vec::new();
+            for other in self.motions.iter().filter(|m| m.v != one.v && m.derivative.uses(name)) {
+                let (pulled, mass) = force_of(self.simulation, other.derivative);
+                let (negative, lever) = signed(above(self.multiple_of(pulled, name, x)?, mass));
+                let sign = if negative { 1.0 } else { -1.0 };
+                pulls.push(Pull { lever: unless_one(lever), ..Pull::new(other.state, sign) });
+                felt.push(other);
+            }
+            let mut sensed = Vec::new();
+            for output in self.simulation.outputs.iter().filter(|o| o.expression.uses(name)) {
+                let (negative, share) = signed(self.multiple_of(&output.expression, name, x)?);
+                let (state, column) = (one.state.to_owned(), output.column.clone());
+                let times = if negative { 1.0 } else { -1.0 };
+                sensed.push(Sensed { felt: Felt::Share(share), state, column, times });
+            }
+            let stretch = Stretch {
+                x: Expr::symbol(x),
+                v: one.rate(),
+                symbol: x,
+                lever: unless_one(lever),
+                other: Some(*felt.first()?),
+                words: format!("in {x}, which pulls at {} coordinates", pulls.len()),
+            };
+            let mut slot = Slot { target: Target::Derivatives(pulls), sensed, ..self.connection(one, stretch) };
+            slot.offer(self.simulation, "k", Expr::symbol(name));
+            Some(slot)
+        };
+        self.simulation.parameters.iter().find_map(|p| stiffness(&p.name))
+    }
+
+    /// What an expression has of the product of a parameter and a displacement, where the parameter multiplies nothing else in it.
+    fn multiple_of(&self, e: &Expr, parameter: &str, x: &str) -> Option<Expr> {
+        let multiplied = coefficient(e, parameter)?;
+        let multiple = coefficient(&multiplied, x)?.simplified();
+        let known = |s: &String| s == x || s == "pi" || self.simulation.parameter(s).is_some();
+        let alone = multiplied.symbols().iter().all(known);
+        (alone && only_parameters(self.simulation, &multiple)).then_some(multiple)
     }
 
     /// Whether two displacements are places, and what is between them pulls at both with one stiffness: neither is a deflection, also where the terms of their
@@ -112,5 +165,70 @@ impl Finder<'_> {
             })
             .collect();
         (!all.is_empty()).then_some(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hysid_plant::{Compiled, Drive, Run, Simulation};
+
+    use crate::mechanism::conformance::example_signals;
+    use crate::mechanism::{Purpose, mechanism};
+    use crate::slot::{Place, Slot, Structure};
+
+    /// A frame of two storeys on a table, in their drifts, with these rates of them and this accelerometer on its roof.
+    fn frame([first, second, roof]: [&str; 3], parameters: &[&str]) -> Simulation {
+        let parameter = |name: &&str| format!("{name} = {{ value = 2.0, min = 0.1 }}\n");
+        let parameters: String = ["m1", "m2", "k1", "k2", "c1", "c2"].iter().chain(parameters).map(parameter).collect();
+        let text = format!(
+            "[time]\nperiod_s = 0.01\n[inputs]\nag = \"table_m_s2\"\n[parameters]\n{parameters}[states]\nd1 = {{ derivative = \"v1\", initial = 0.0, unit = \"m\" }}\n\
+             v1 = {{ derivative = \"{first}\", initial = 0.0, unit = \"m/s\" }}\nd2 = {{ derivative = \"v2\", initial = 0.0, unit = \"m\" }}\n\
+             v2 = {{ derivative = \"{second}\", initial = 0.0, unit = \"m/s\" }}\n[outputs]\ndrift_mm = \"1000*d1\"\nroof_m_s2 = \"{roof}\"\n"
+        );
+        Simulation::parse(&text, "frame.sim.toml").unwrap()
+    }
+
+    /// What both outputs show where each parameter has a value of its own.
+    fn shown(simulation: &Simulation) -> Vec<Vec<f64>> {
+        let ag: Vec<f64> = (0..300).map(|i| 4.0 * (0.05 * f64::from(i)).sin()).collect();
+        let drive = Drive::new(0.0, 0.01, ag.len(), vec![ag]).unwrap();
+        let value = |name: &str| match name {
+            "x_0" => 0.02,
+            "m1" | "c1" => 1.5,
+            "k1" | "k2" => 40.0,
+            "k_b" => 30.0,
+            _ => 0.7,
+        };
+        let parameters: Vec<f64> = simulation.parameters.iter().map(|p| value(&p.name)).collect();
+        Compiled::new(simulation).unwrap().simulate(&Run::new(&drive, &parameters)).outputs
+    }
+
+    #[test]
+    fn a_spring_pulls_and_is_felt_wherever_its_stiffness_stands() {
+        let equations = [
+            "-ag - (k1*d1 + c1*v1 - k2*d2 - c2*v2)/m1",
+            "(k1*d1 + c1*v1)/m1 - (k2*d2 + c2*v2)*(1/m1 + 1/m2)",
+            "-(k2*d2 + c2*v2)/m2",
+        ];
+        let plain = frame(equations, &[]);
+        let slots: Vec<Slot> =
+            Structure::of(&plain).slots.into_iter().filter(|s| s.place == Place::Connection).collect();
+        let stiffness = |slot: &Slot| slot.quantity("k").map(|q| q.expression.to_string());
+        let found: Vec<_> = slots.iter().map(|s| (s.label.as_str(), stiffness(s).unwrap())).collect();
+        assert_eq!(found, [("state:v1", "k1/m1".to_owned()), ("state:v2", "k2".to_owned())]);
+        let law = mechanism("bilinear_stiffness").unwrap();
+        // Where the equation divides it by the mass, the new one is, too.
+        for (slot, (x, unit)) in slots.iter().zip([("d1", "m1*"), ("d2", "")]) {
+            let written = law.rewrite(&plain, slot, &example_signals(&plain, slot), Purpose::Refit).unwrap().simulation;
+            // As if another spring had stood there from the first.
+            let spring = format!("k{}*{x}", &x[1..]);
+            let bent = format!("({spring} + {unit}k_b*max({x} - x_0, 0))");
+            let wanted = equations.map(|e| e.replace(&spring, &bent));
+            let wanted = shown(&frame([&wanted[0], &wanted[1], &wanted[2]], &["k_b", "x_0"]));
+            assert!(wanted != shown(&plain), "it is never reached");
+            for (a, b) in shown(&written).iter().zip(&wanted) {
+                assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs())), "{written:?}");
+            }
+        }
     }
 }

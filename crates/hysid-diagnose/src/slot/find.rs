@@ -41,7 +41,8 @@ impl Structure {
         slots.extend(finder.parameters());
         slots.extend(finder.disturbances());
         for slot in &mut slots {
-            if let Target::Derivatives(states) = &slot.target {
+            // What an element is felt by was told with it.
+            if let (Target::Derivatives(states), true) = (&slot.target, slot.sensed.is_empty()) {
                 let here = |s: &&Sensed| states.iter().any(|pull| pull.state == s.state);
                 slot.sensed = sensed.iter().filter(here).cloned().collect();
             }

@@ -10,12 +10,14 @@ use super::find::is_one_of;
 use crate::random::generator;
 
 /// What a sensor feels of a force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Felt {
     /// The acceleration that comes of it.
     Rate,
     /// The force itself.
     Force,
+    /// This share of the force of an element, before any lever by which a state feels it.
+    Share(Expr),
 }
 
 /// An output that is a multiple of the derivative of a state, or of the forces that hold it, but for what no state moves.
@@ -27,7 +29,7 @@ pub(crate) struct Sensed {
     pub state: String,
     /// The output's column.
     pub column: String,
-    /// The multiple.
+    /// The multiple; the sign of a share.
     pub times: f64,
 }
 
