@@ -252,7 +252,7 @@ fn choose(base: &Base<'_>, kind: NoiseKind, terms: &[Term], noise: &Whitener, no
 
 #[cfg(test)]
 mod tests {
-    use hysid_plant::{Compiled, Drive, Run};
+    use hysid_plant::{Compiled, Drive, Expr, Run};
 
     use super::*;
     use crate::budget::Budget;
@@ -268,10 +268,17 @@ mod tests {
 
     /// What is said to be missing in the simulation of a load on an elastic rope, where this stands in the equation of the rope.
     fn missing(coupling: &str) -> Option<OpenSet> {
+        missing_in(|truth| {
+            let elastic = truth.state("sd").unwrap().derivative.to_string();
+            truth.state_mut("sd").unwrap().derivative = Expr::parse(&format!("{elastic}{coupling}")).unwrap();
+        })
+    }
+
+    /// The same where the machine is this other one.
+    fn missing_in(change: impl Fn(&mut Simulation)) -> Option<OpenSet> {
         let original = Simulation::parse(CRANE, "crane.sim.toml").unwrap();
         let mut truth = original.clone();
-        let elastic = truth.state("sd").unwrap().derivative.to_string();
-        truth.state_mut("sd").unwrap().derivative = hysid_plant::Expr::parse(&format!("{elastic}{coupling}")).unwrap();
+        change(&mut truth);
         let mut random = normal(3);
         let a: Vec<f64> = drive(1500, &mut random);
         let size = 1.5 / rms(&a);
@@ -315,6 +322,19 @@ mod tests {
         assert!((first.coefficient / 20.0 - 1.0).abs() < 0.1 && found.gain > 50.0, "{first:?} {}", found.gain);
         let nothing = missing("");
         assert!(nothing.is_none_or(|o| o.by_chance(ODDS_AGAINST) > 0.1));
+    }
+
+    #[test]
+    fn what_a_sensor_shows_of_another_is_seen() {
+        let found = missing_in(|truth| {
+            let mixed = Expr::parse("s + 0.02*th").unwrap();
+            truth.output_mut("stretch_m").unwrap().expression = mixed;
+        });
+        let OpenSet { record, gain, .. } = found.unwrap();
+        let first = &record.terms[0];
+        let told = (record.slot.as_str(), first.term.as_str(), record.signature.side.as_str());
+        assert_eq!(told, ("output:stretch_m", "swing_rad", "output"), "{:?}", record.terms);
+        assert!((first.coefficient / 0.02 - 1.0).abs() < 0.05 && gain > 50.0, "{first:?} {gain}");
     }
 
     /// What is said to be missing in a simulation, where a state of the truth has another derivative and the one output a noise of this share.

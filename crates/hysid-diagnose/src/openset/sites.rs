@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hysid_plant::{Expr, Simulation, Slot as Place};
+use hysid_plant::{Expr, Output, Simulation, Slot as Place};
 
 use crate::slot::{OWN_VELOCITY, Place as Slotted, Slot, Structure, is_turn};
 
@@ -95,7 +95,12 @@ pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
         } else {
             ("output", vec![Symbol::new("y", output.expression.clone())])
         };
-        Site::alone(Place::Output(i), format!("output:{}", output.column), side, own)
+        // What another sensor shows, of which this one may show a share (the cross-talk of a force platform).
+        let shown = |(_, o): (usize, &Output)| Symbol::new(&o.column, o.expression.clone());
+        let elsewhere =
+            simulation.outputs.iter().enumerate().filter(|(j, o)| *j != i && o.expression != output.expression);
+        let others = if simulation.is_static() { Vec::new() } else { elsewhere.take(OTHERS).map(shown).collect() };
+        Site { others, ..Site::alone(Place::Output(i), format!("output:{}", output.column), side, own) }
     });
     states.chain(inputs.filter(|site| has_slot(&site.slot))).chain(outputs).collect()
 }
