@@ -157,12 +157,15 @@ impl Finder<'_> {
     }
 
     /// The input by which a damping force is controlled, as the voltage of a magnetorheological damper: the coefficient of the velocity
-    /// holds it, and it is itself no motion.
+    /// holds it, and it is itself neither a motion nor what presses, as a clamping force: that is a load.
     pub(super) fn control(&self, force: &Expr, v: &Expr) -> Option<Expr> {
         let Expr::Symbol(v) = v else { return None };
         let damping: Vec<Expr> = force.terms().into_iter().filter_map(|(_, term)| coefficient(term, v)).collect();
-        let controls =
-            |input: &str| self.kinematic_input(input) == Kinematic::Neither && damping.iter().any(|c| c.uses(input));
+        let controls = |input: &str| {
+            self.kinematic_input(input) == Kinematic::Neither
+                && !self.simulation.unit_of(input).is_some_and(|u| presses(&u))
+                && damping.iter().any(|c| c.uses(input))
+        };
         let input = self.simulation.inputs.iter().find(|i| controls(&i.symbol))?;
         Some(Expr::symbol(&input.symbol))
     }

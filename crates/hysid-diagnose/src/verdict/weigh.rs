@@ -162,9 +162,16 @@ pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
     any_at_bound(base, effect.written.parameters_of().iter())
 }
 
-/// Whether an amplitude of the effect stands at a bound: the law is stretched to what it was not made for, something else may be meant.
+/// Whether an amplitude of the effect stands at a bound other than nothing: the law is stretched to what it was not made for, something else may be meant. One
+/// of several that is nothing (a friction that a load makes, without a constant part) stretches nothing.
 pub fn stretched(base: &Base<'_>, effect: &Effect) -> bool {
-    any_at_bound(base, effect.written.amplitudes.iter().map(|a| &a.name))
+    let (mut far, mut there) = (false, false);
+    for place in effect.written.amplitudes.iter().filter_map(|a| base.model.place_of(&a.name)) {
+        let nothing = base.fit.theta[place] == 0.0;
+        far |= base.fit.at_bound[place] && !nothing;
+        there |= !nothing;
+    }
+    far || (!there && !effect.written.amplitudes.is_empty())
 }
 
 /// Whether an effect that the clock drives is as strong as its law allows: a parameter that jumps to four times its value, a disturbance beyond all forces.
@@ -291,9 +298,10 @@ mod tests {
         assert!(base.fit.theta[place] > 0.0 && !overdone(&base, &effects[0]));
         base.fit.at_bound[place] = true;
         assert!(overdone(&base, &effects[0]));
-        // At zero the law does nothing, which is no strength.
+        assert!(stretched(&base, &effects[0]));
+        // At zero the law does nothing, which is no strength, and where nothing else of it does either it is no law.
         base.fit.theta[place] = 0.0;
-        assert!(!overdone(&base, &effects[0]));
+        assert!(!overdone(&base, &effects[0]) && stretched(&base, &effects[0]));
     }
 
     #[test]
