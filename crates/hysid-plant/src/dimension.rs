@@ -108,7 +108,7 @@ fn same(whole: &Expr, a: &Expr, left: Option<Unit>, b: &Expr, right: Option<Unit
 /// The unit of a sum of which only one side is known. An angle is a pure number with a name: a lift coefficient may hold `C_q*d(alpha)`, in radians, and is no
 /// angle for that.
 fn beside_unknown(known: Unit, other: &Expr) -> Unit {
-    let angle = !known.clashes(&Unit::none());
+    let angle = known.same_dimension(&Unit::none());
     if angle && !matches!(other, Expr::Number(_)) { Unit::none() } else { known }
 }
 
@@ -162,6 +162,24 @@ impl Simulation {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_units_that_are_not_known_may_be_right() {
+        let text = |c: &str, k: &str| {
+            format!(
+                "[time]\nperiod_s = 0.1\n[inputs]\nu = \"u_N\"\n[parameters]\nm = {{ value = 1.0, fixed = true, unit = \"kg\" }}\n\
+                 c = {{ value = 1.0, fixed = true, unit = \"{c}\" }}\nk = {{ value = 1.0, fixed = true, unit = \"{k}\" }}\n[states]\n\
+                 x = {{ derivative = \"v\", initial = 0.0, unit = \"m\" }}\n\
+                 v = {{ derivative = \"(u - c*v - k*x)/m\", initial = 0.0, unit = \"m/s\" }}\n[outputs]\nx_m = \"x\"\n"
+            )
+        };
+        for (c, k) in [("N s/psi", "N/psi"), ("N s/psi", "N/m"), ("N s/blorb", "N/psi"), ("N s/m", "N/m")] {
+            let read = Simulation::parse(&text(c, k), "units.sim.toml");
+            assert!(read.is_ok(), "{c}, {k}: {}", read.unwrap_err());
+        }
+        let clash = Simulation::parse(&text("N s/psi", "N s/psi"), "units.sim.toml").unwrap_err().to_string();
+        assert!(clash.contains("`u - c*v`") && clash.contains("`k*x`"), "{clash}");
+    }
 
     #[test]
     fn an_angle_beside_what_is_unknown_is_a_number() {
