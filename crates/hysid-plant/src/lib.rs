@@ -11,6 +11,7 @@ mod engine;
 mod error;
 mod expr;
 mod number;
+mod still;
 mod unit;
 
 pub use calibrate::{Calibration, CalibrationError, Data, Effort, Flag, INITIAL_SHARE, Settings};

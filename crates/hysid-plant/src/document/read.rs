@@ -243,7 +243,8 @@ impl Simulation {
     /// The simulation that a `.sim.toml` file's text stands for; `file_name` is for messages only.
     ///
     /// # Errors
-    /// The first thing that is wrong: TOML syntax, an unknown or missing key, or anything that [`Simulation::validate`] finds.
+    /// The first thing that is wrong: TOML syntax, an unknown or missing key, anything that [`Simulation::validate`] finds, or an
+    /// output that is a constant although it names what moves (`x - x`).
     pub fn parse(text: &str, file_name: &str) -> Result<Self, Error> {
         let file = Some(file_name.to_owned());
         if text.len() > LARGEST_FILE {
@@ -259,7 +260,8 @@ impl Simulation {
         })?;
         let mut reader = Reader { spans: HashMap::new() };
         let simulation = read(&mut reader, root.get_ref());
-        simulation.and_then(|s| s.first_fault().map_or(Ok(s), Err)).map_err(|fault| {
+        let judged = |s: Simulation| s.first_fault().or_else(|| s.cancelled_output()).map_or(Ok(s), Err);
+        simulation.and_then(judged).map_err(|fault| {
             let key = fault.key.trim_end_matches("#key").to_owned();
             let span = reader.spans.get(&fault.key).or_else(|| reader.spans.get(&key));
             let offset = span.map(|span| {

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{ClockSource, Initial, Simulation};
+use super::{ClockSource, Initial, Output, Simulation};
 use crate::error::{Error, ErrorKind};
 use crate::expr::{Expr, is_identifier, is_reserved};
+use crate::still::is_constant;
 
 /// A place in the value of a key.
 pub(crate) enum Within {
@@ -44,6 +45,11 @@ fn fault(key: impl Into<String>, kind: ErrorKind) -> Fault {
 
 fn fault_in(key: &str, symbol: &str, kind: ErrorKind) -> Fault {
     Fault::at_use(key, symbol, 0, kind)
+}
+
+fn constant_output(output: &Output) -> Fault {
+    let message = "this output depends on no state and no input: it is a constant".to_owned();
+    fault(format!("outputs.{}", output.column), ErrorKind::NothingDrivesOutput(message))
 }
 
 impl Simulation {
@@ -264,17 +270,26 @@ impl Simulation {
         crate::dimension::first_clash(self).map(|(key, message)| fault(key, ErrorKind::UnitClash(message)))
     }
 
+    /// An output whose states and inputs cancel (`x - x`). No fault of a simulation that is made to look at quantities, of which one may stand still:
+    /// only files are held to it.
+    pub(crate) fn cancelled_output(&self) -> Option<Fault> {
+        let constant = |o: &&Output| is_constant(&o.expression, &|s| self.moves(s));
+        self.outputs.iter().find(constant).map(constant_output)
+    }
+
+    /// Whether a symbol changes during a run.
+    fn moves(&self, symbol: &str) -> bool {
+        symbol == "t" || self.input(symbol).is_some() || self.state(symbol).is_some()
+    }
+
     fn fault_in_outputs(&self) -> Option<Fault> {
         if self.outputs.is_empty() {
             return Some(fault("outputs", ErrorKind::NothingDrivesOutput("there is no output".to_owned())));
         }
         // What each symbol rests on, through the equations: states that a state's derivative uses.
         for output in &self.outputs {
-            let symbols = output.expression.symbols();
-            let moves = |s: &String| s == "t" || self.input(s).is_some() || self.state(s).is_some();
-            if !symbols.iter().any(moves) {
-                let message = "this output depends on no state and no input: it is a constant".to_owned();
-                return Some(fault(format!("outputs.{}", output.column), ErrorKind::NothingDrivesOutput(message)));
+            if !output.expression.symbols().iter().any(|s| self.moves(s)) {
+                return Some(constant_output(output));
             }
         }
         let uses_state = |e: &Expr| e.symbols().iter().any(|s| self.state(s).is_some());

@@ -88,6 +88,7 @@ fn every_kind_of_bad_file_is_told() {
         ("[outputs]\nx_m = \"x\"", "", "", &["`[outputs]` is missing"]),
         ("x_m = \"x\"", "", "", &["there is no output"]),
         ("x_m = \"x\"", "x_m = \"2*m\"", "19:7", &["constant"]),
+        ("x_m = \"x\"", "x_m = \"x - x\"", "19:7", &["`outputs.x_m`", "constant"]),
         ("x_m = \"x\"", "x_m = \"2*u\"", "19:7", &["depends on any state"]),
         ("x_m = \"x\"", "x_m = [1, 2]", "19:7", &["an expression in quotes"]),
         ("x_m = \"x\"", "x_m = \"x\"\n[options]\na = 1", "20:", &["`options`", "unknown key"]),
