@@ -110,7 +110,7 @@ fn simulations() -> Vec<Case> {
             "initial = \"u/k\", unit = \"m\"",
             &["base.sim.toml:12:", "changes with time"],
         ),
-        c("parameter named twice", "c = {", "m = {", &["base.sim.toml:9:", "duplicate key"]),
+        c("parameter named twice", "c = {", "m = {", &["base.sim.toml:9:", "duplicate key `m`"]),
         c("reserved symbol", "u = \"u_N\"", "pi = \"u_N\"", &["base.sim.toml:6:", "reserved"]),
         c("symbol of two things", "u = \"u_N\"", "k = \"u_N\"", &["base.sim.toml", "`k` is already"]),
         c("division by zero at the start", "- k*x)/m", "- k*x)/(m*x/0.1)", &["base.sim.toml", "state `v`", "est.csv"]),

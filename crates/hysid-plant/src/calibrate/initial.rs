@@ -33,19 +33,25 @@ impl Compiled {
         }
     }
 
-    /// A sentence on why a run that started at states `x` with inputs `u` diverged at sample `at`.
+    /// The key at fault and a sentence on why a run that started at states `x` with inputs `u` diverged at sample `at`.
     pub fn explain_divergence(&self, theta: &[f64], x: &[f64], u: &[f64], response: &Response) -> String {
         let Some(at) = response.diverged else { return String::new() };
         let point = self.linearise(theta, x, u);
         let simulation = self.simulation();
         if let Some((state, value)) = simulation.states.iter().zip(&point.flow).find(|(_, f)| !f.is_finite()) {
-            return format!("the derivative of state `{}` is {value} at the first sample", state.name);
+            return format!(
+                "`states.{0}.derivative`: the derivative of state `{0}` is {value} at the first sample",
+                state.name
+            );
         }
         if let Some((output, value)) = simulation.outputs.iter().zip(&point.outputs).find(|(_, y)| !y.is_finite()) {
-            return format!("output `{}` is {value} at the first sample", output.column);
+            return format!("`outputs.{0}`: output `{0}` is {value} at the first sample", output.column);
         }
         if let Some(output) = response.diverged_output.and_then(|j| simulation.outputs.get(j)) {
-            return format!("output `{}` is not finite at sample {at}, though all states are", output.column);
+            return format!(
+                "`outputs.{0}`: output `{0}` is not finite at sample {at}, though all states are",
+                output.column
+            );
         }
         let last = at.saturating_sub(1);
         let size = |i: usize| response.states.get(i).and_then(|s| s.get(last)).map_or(0.0, |x| x.abs());
@@ -53,7 +59,7 @@ impl Compiled {
         match largest.and_then(|i| simulation.states.get(i).map(|s| (i, s))) {
             Some((i, state)) => {
                 format!(
-                    "state `{}` explodes: it is {} at sample {last} and not finite at sample {at}",
+                    "`states.{0}.derivative`: state `{0}` explodes: it is {1} at sample {last} and not finite at sample {at}",
                     state.name,
                     digits(size(i), 4)
                 )

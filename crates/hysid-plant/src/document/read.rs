@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use hysid_signal::tell::brief;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -231,8 +232,11 @@ fn place(text: &str, offset: usize) -> Place {
     }
 }
 
-/// A message of the TOML reader, which takes a word without quotes for the beginning of `true` or `false`.
-fn told(message: &str) -> String {
+/// A message of the TOML reader about the text at its place; it takes a word without quotes for the beginning of `true` or `false`.
+fn told(message: &str, place: &str) -> String {
+    if message == "duplicate key" {
+        return format!("duplicate key `{}`", brief(place.trim()));
+    }
     if message.contains("boolean") || message.contains("quoted") {
         return "a text stands in quotes, as in \"free\" or \"-k*x\"".to_owned();
     }
@@ -256,7 +260,7 @@ impl Simulation {
             file: file.clone(),
             place: e.span().map(|span| place(text, span.start)),
             key: String::new(),
-            kind: ErrorKind::Toml(told(e.message())),
+            kind: ErrorKind::Toml(told(e.message(), e.span().and_then(|span| text.get(span)).unwrap_or_default())),
         })?;
         let mut reader = Reader { spans: HashMap::new() };
         let simulation = read(&mut reader, root.get_ref());
