@@ -82,6 +82,11 @@ pub enum InputProblem {
     /// The text is not UTF-8.
     #[error("the text is not UTF-8{0}")]
     NotUtf8(&'static str),
+    /// The line ends are those of an old Macintosh.
+    #[error(
+        "the lines end in a carriage return (CR) alone; they must end in LF or CR LF: save the file with the line ends of Unix or Windows"
+    )]
+    CarriageReturns,
     /// The first line holds numbers.
     #[error("the first line holds numbers; it must name the columns")]
     NoHeader,

@@ -118,6 +118,12 @@ fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> InputError 
     ] {
         said = said.replace(ours, plain);
     }
+    if let Some((before, _)) = said.split_once("expected struct ") {
+        // Of an array in the place of an object the parser may count the elements.
+        let array = before.starts_with("invalid length") || before.starts_with("invalid type: sequence");
+        let before = if array { "this is an array, " } else { before };
+        said = format!("{before}expected an object, `{{...}}`");
+    }
     if line == 0 {
         return InputError::whole(path, InputProblem::Json(said));
     }

@@ -105,6 +105,9 @@ fn header(file: &Path, text: &[u8]) -> Result<(Vec<String>, usize, u64), InputEr
             break row;
         }
     };
+    if row.contains(&b'\r') {
+        return Err(InputError::at(file, line, None, InputProblem::CarriageReturns));
+    }
     let mut fields = Fields::default();
     fields.split(row);
     let at = |column: Option<&str>, problem| InputError::at(file, line, column, problem);

@@ -58,6 +58,7 @@ fn each_bad_recording_ends_every_command_with_one_clear_message() {
             &["UTF-16"],
         ),
         ("semicolons", replaced(",", ";"), &["line 1", "semicolons"]),
+        ("lines that end in CR", replaced("\n", "\r"), &["rec.csv, line 1:", "carriage return", "LF"]),
         (
             "no header",
             good().lines().skip(1).collect::<Vec<_>>().join("\n").into_bytes(),
@@ -121,6 +122,8 @@ fn each_bad_request_ends_with_one_clear_message() {
     std::fs::write(dir.path().join("short.csv"), first(6)).unwrap();
     std::fs::write(dir.path().join("no_clock.csv"), "u_V,y_mm\n1,2\n2,3\n").unwrap();
     std::fs::write(dir.path().join("model.json"), "{\"format\": \"something else\", \"format_version\": 1}").unwrap();
+    std::fs::write(dir.path().join("array.json"), "[]").unwrap();
+    std::fs::create_dir_all(dir.path().join("taken/fit.json")).unwrap();
     std::fs::create_dir(dir.path().join("folder")).unwrap();
     let fit = ["fit", "--recording", "rec.csv", "--input", "u_V", "--output", "y_mm", "--out", "out"];
     let with = |more: &[&'static str]| fit.iter().copied().chain(more.iter().copied()).collect::<Vec<_>>();
@@ -192,6 +195,11 @@ fn each_bad_request_ends_with_one_clear_message() {
             "none.json",
         ),
         ("predict: no JSON", vec!["predict", "rec.csv", "--recording", "rec.csv", "--out", "out.csv"], "rec.csv"),
+        (
+            "predict: an array",
+            vec!["predict", "array.json", "--recording", "rec.csv", "--out", "out.csv"],
+            "array.json, line 1: not the JSON that is needed: column 2: this is an array, expected an object",
+        ),
         (
             "predict: another format",
             vec!["predict", "model.json", "--recording", "rec.csv", "--out", "out.csv"],
