@@ -17,12 +17,31 @@ pub(crate) fn replace(
     fill: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> std::result::Result<(), WriteError> {
     let written = match fs::metadata(path) {
-        Ok(there) if there.is_dir() => Err(Error::new(ErrorKind::IsADirectory, "it is a folder; name a file")),
+        Ok(there) if there.is_dir() => Err(is_folder()),
         Ok(there) if !there.is_file() => through(path, fill),
         Ok(_) => fs::canonicalize(path).and_then(|file| put(&file, fill)),
         Err(_) => put(path, fill),
     };
     written.map_err(|source| WriteError { file: path.to_path_buf(), source })
+}
+
+/// Whether a file could be put at `path` now, found out by a file beside it that goes again: what takes long is asked this before it begins.
+///
+/// # Errors
+/// The folder does not exist or may not be written, the path is a directory.
+pub fn check_writable(path: &Path) -> std::result::Result<(), WriteError> {
+    let possible = match fs::metadata(path) {
+        Ok(there) if there.is_dir() => Err(is_folder()),
+        // A device or a pipe is only opened to be written to.
+        Ok(there) if !there.is_file() => Ok(()),
+        Ok(_) => fs::canonicalize(path).and_then(|file| beside(&file, |_| Ok(()))),
+        Err(_) => beside(path, |_| Ok(())),
+    };
+    possible.map_err(|source| WriteError { file: path.to_path_buf(), source })
+}
+
+fn is_folder() -> Error {
+    Error::new(ErrorKind::IsADirectory, "it is a folder; name a file")
 }
 
 /// Writes into what is there.
@@ -34,20 +53,23 @@ fn through(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -
 
 /// Writes a file beside `path` and renames it.
 fn put(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+    beside(path, |partial| {
+        let mut writer = BufWriter::with_capacity(BUFFER, File::options().write(true).open(partial)?);
+        fill(&mut writer)?;
+        writer.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
+        fs::rename(partial, path)
+    })
+}
+
+/// Makes an empty file beside `path` for `work`; it is gone at the end unless it was renamed.
+fn beside(path: &Path, work: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let name = path.file_name().ok_or_else(|| Error::new(ErrorKind::InvalidInput, "the path names no file"))?;
     let mut partial = name.to_os_string();
     partial.push(format!(".{}.partial", std::process::id()));
     let partial = path.with_file_name(partial);
-    let written = File::create(&partial).and_then(|file| {
-        let mut writer = BufWriter::with_capacity(BUFFER, file);
-        fill(&mut writer)?;
-        writer.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
-        fs::rename(&partial, path)
-    });
-    if written.is_err() {
-        let _ = fs::remove_file(&partial);
-    }
-    written
+    let done = File::create(&partial).and_then(|_| work(&partial));
+    let _ = fs::remove_file(&partial);
+    done
 }
 
 /// Writes these bytes to `path`, by way of a file beside it that is renamed at the end.

@@ -26,7 +26,7 @@ mod stream;
 mod text;
 mod write;
 
-pub use atomic::write_bytes;
+pub use atomic::{check_writable, write_bytes};
 pub use chunks::CsvChunks;
 pub use clock::{ClockFit, fit_clock};
 pub use clock_watch::ClockWatch;

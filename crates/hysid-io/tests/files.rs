@@ -1,8 +1,8 @@
 //! What is written reads back as the same; a failed write leaves nothing behind.
 
 use hysid_io::{
-    CsvChunks, InputProblem, ReadOptions, TimeSource, format_number, read_recording, read_text, read_versioned,
-    write_csv, write_recording, write_versioned,
+    CsvChunks, InputProblem, ReadOptions, TimeSource, check_writable, format_number, read_recording, read_text,
+    read_versioned, write_csv, write_recording, write_versioned,
 };
 use hysid_signal::{Channel, Clock, Recording};
 use proptest::prelude::*;
@@ -192,4 +192,24 @@ fn real_clocks_are_read() {
     }
     let wall = ReadOptions { time: TimeSource::ColumnOrPeriod("t_s".into(), 0.002), columns: None };
     assert_eq!(read_recording(&root.join("rocking_wall_ts1/ts1.csv"), &wall).unwrap().clock().period_s, 0.002);
+}
+
+#[test]
+fn what_could_be_written_is_told_before_and_leaves_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("r.csv");
+    check_writable(&file).unwrap();
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    std::fs::write(&file, "kept").unwrap();
+    check_writable(&file).unwrap();
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    for (path, why) in [
+        (dir.path().to_path_buf(), "it is a folder"),
+        (file.join("x.csv"), "r.csv/x.csv"),
+        (dir.path().join("no/x.csv"), "no/x.csv"),
+    ] {
+        let told = check_writable(&path).unwrap_err().to_string();
+        assert!(told.contains("cannot be written") && told.contains(why), "{told}");
+    }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 use hysid_decimate::{Decimator, FactorRow, Phase, Recommendation, examine, recommend, reduce};
-use hysid_io::{ReadOptions, TimeSource, read_recording, require, write_recording};
+use hysid_io::{ReadOptions, TimeSource, check_writable, read_recording, require, write_recording};
 use serde_json::{Value, json};
 
 use super::files::keep_inputs;
@@ -76,6 +76,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     if let Some(out) = &args.out {
         keep_inputs(out, &[], [&args.recording])?;
+        check_writable(out).map_err(Failure::bad_input)?;
     }
     let decimator = match args.method {
         Method::Plain => Decimator::Plain,

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use hysid::identify::{Criterion, Decimate, Factors, FitReport, IdentifyError, Options, Source, identify};
-use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require, write_text};
+use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require};
 use hysid_signal::Recording;
 use hysid_signal::tell::brief;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::files::{keep_inputs, no_file_twice, no_samples_twice};
+use super::folder::Folder;
 use super::threads::pool;
 use crate::failure::Failure;
 
@@ -113,6 +114,7 @@ pub(crate) const TIME: &str = "t_s";
 const MODEL: &str = "model.json";
 const SUMMARY: &str = "fit.json";
 const PAGE: &str = "report.html";
+const NAMES: [&str; 3] = [MODEL, SUMMARY, PAGE];
 
 /// Samples without which no recording can teach even a linear model and hold some back to judge it.
 const FEWEST_SAMPLES: usize = 20;
@@ -147,7 +149,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::BadInput(problem));
     }
     let pool = pool(args.threads)?;
-    keep_inputs(&args.out, &[MODEL, SUMMARY, PAGE], args.recordings.iter().chain(&args.holdouts))?;
+    keep_inputs(&args.out, &NAMES, args.recordings.iter().chain(&args.holdouts))?;
     no_file_twice(&args.recordings, &args.holdouts)?;
     let mut columns: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
     columns.push(&args.output);
@@ -172,9 +174,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     for recording in &estimation {
         require::samples(recording, &columns, FEWEST_SAMPLES).map_err(Failure::bad_input)?;
     }
-    if args.out.exists() && !args.out.is_dir() {
-        return Err(Failure::BadInput(format!("{}: it is there and is not a folder", args.out.display())));
-    }
+    let folder = Folder::claim(&args.out, &NAMES)?;
     let bar = progress();
     let source = Source { recordings: &estimation, inputs: &args.inputs, output: &args.output };
     let found = pool.install(|| identify(source, &options, &|what| bar.set_message(what.to_string())));
@@ -184,11 +184,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         found.model = found.model.without_clock();
     }
     let report = FitReport::new(&found, &estimation, &holdout, args.seed).map_err(|e| told(&args.recordings, &e))?;
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::BadInput(format!("{}: {e}", args.out.display())))?;
-    found.model.save(&args.out.join(MODEL)).map_err(Failure::bad_input)?;
-    hysid_io::write_json(&args.out.join(SUMMARY), &report.summary).map_err(Failure::bad_input)?;
-    let html = hysid_report::fit::page(&report, &crate::provenance());
-    write_text(&args.out.join(PAGE), &html).map_err(Failure::bad_input)?;
+    found.model.save(&args.out.join(MODEL)).map_err(anyhow::Error::from)?;
+    folder.json(SUMMARY, &report.summary)?;
+    folder.text(PAGE, &hysid_report::fit::page(&report, &crate::provenance()))?;
     if args.json {
         let text = serde_json::to_string_pretty(&report.summary).map_err(|e| Failure::Internal(e.into()))?;
         println!("{text}");

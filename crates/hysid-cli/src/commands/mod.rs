@@ -7,6 +7,7 @@ pub mod demo;
 pub mod diagnose;
 mod files;
 pub mod fit;
+mod folder;
 pub mod generate;
 pub mod inspect;
 pub mod predict;

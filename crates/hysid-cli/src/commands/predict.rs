@@ -53,6 +53,7 @@ fn mode(text: &str) -> Result<Mode, String> {
 /// Reads, predicts, writes.
 pub fn run(args: &Args) -> Result<(), Failure> {
     keep_inputs(&args.out, &[], [&args.model, &args.recording])?;
+    hysid_io::check_writable(&args.out).map_err(Failure::bad_input)?;
     let model = NarxModel::load(&args.model).map_err(Failure::bad_input)?;
     let output = model.signals().output().column.clone();
     let mut columns = model.input_columns();

@@ -288,6 +288,12 @@ fn requests() -> Vec<Case> {
             &["--out notes.txt", "not a folder"],
         ),
         case(
+            "a folder in the place of a result",
+            |dir| std::fs::create_dir_all(dir.join("taken/diagnosis.json")).unwrap(),
+            &line(&DIAGNOSE, "out", "taken", &[]),
+            &["--out taken: taken/diagnosis.json cannot be written", "folder"],
+        ),
+        case(
             "a folder in a file as --out",
             nothing,
             &line(&DIAGNOSE, "out", "notes.txt/out", &[]),

@@ -154,6 +154,16 @@ fn each_bad_request_ends_with_one_clear_message() {
             "folder cannot be written",
         ),
         (
+            "fit: folder in the place of a result",
+            vec!["fit", "--recording", "rec.csv", "--input", "u_V", "--output", "y_mm", "--out", "taken"],
+            "--out taken: taken/fit.json cannot be written",
+        ),
+        (
+            "fit: file in the place of the folder",
+            vec!["fit", "--recording", "rec.csv", "--input", "u_V", "--output", "y_mm", "--out", "rec.csv/out"],
+            "--out rec.csv/out: ",
+        ),
+        (
             "no folder for output",
             vec!["decimate", "rec.csv", "--output", "y_mm", "--out", "none/out.csv"],
             "cannot be written",

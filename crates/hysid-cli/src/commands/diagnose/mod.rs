@@ -1,7 +1,6 @@
 //! `hysid diagnose`: what a simulation leaves out, found from recordings.
 
 mod black_box;
-mod folder;
 mod intake;
 
 use std::path::PathBuf;
@@ -12,9 +11,9 @@ use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 
-use self::folder::Folder;
 use self::intake::{Files, Intake};
 use super::files::keep_inputs;
+use super::folder::Folder;
 use super::simulation_file;
 use super::threads::pool;
 use crate::failure::Failure;
@@ -23,6 +22,7 @@ use crate::failure::Failure;
 const PAGE: &str = "report.html";
 const AUGMENTED: &str = "augmented.sim.toml";
 const DIAGNOSIS: &str = "diagnosis.json";
+const NAMES: [&str; 3] = [PAGE, AUGMENTED, DIAGNOSIS];
 
 /// Find what physics a simulation leaves out: where it parts from a recording, a name, a sentence, a better simulation
 #[derive(Debug, clap::Args)]
@@ -93,19 +93,19 @@ fn work(args: &Args) -> Result<(), Failure> {
     let watch = Watch { progress: &progress, expired: &expired, black_box };
     let files = Files { estimation: &args.recording, holdout: &args.holdout };
     let inputs = args.simulation.iter().chain(&args.recording).chain(&args.holdout);
-    keep_inputs(&args.out, &[PAGE, AUGMENTED, DIAGNOSIS], inputs)?;
+    keep_inputs(&args.out, &NAMES, inputs)?;
     let (outcome, folder) = match (&args.simulation, &args.simulated) {
         (Some(file), _) => {
             let (simulation, name) = simulation_file::read(file)?;
             let intake = files.of_simulation(&simulation)?;
-            let folder = Folder::claim(&args.out)?;
+            let folder = Folder::claim(&args.out, &NAMES)?;
             (answer(&simulation, &name, &intake, &questions, options, &watch)?, folder)
         }
         (None, Some(column)) => {
             let output = args.output.clone().unwrap_or_default();
             let columns: Vec<String> = args.input.iter().cloned().chain([output.clone(), column.clone()]).collect();
             let intake = files.of_columns(&columns)?;
-            let folder = Folder::claim(&args.out)?;
+            let folder = Folder::claim(&args.out, &NAMES)?;
             progress("finding a clone of the simulated column");
             let stand_in =
                 stand_in(&args.input, &output, column, &intake.estimation, args.seed).map_err(Failure::bad_input)?;

@@ -1,7 +1,7 @@
 //! The folder of the results: claimed before the work begins, left as it was where the work fails.
 //!
-//! A diagnosis can take a minute: that its folder cannot be written must be known at once. What is claimed is therefore tried out with a
-//! file, and folders that had to be made for it go again unless results were put in.
+//! A diagnosis can take a minute: that its folder cannot be written must be known at once. What is claimed is therefore tried out with
+//! files, and folders that had to be made for it go again unless results were put in.
 
 use std::path::{Path, PathBuf};
 
@@ -19,11 +19,11 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Makes the folder where it is not there, and tries to write into it.
+    /// Makes the folder where it is not there, and tries out whether the files of these names can be written in it.
     ///
     /// # Errors
     /// A path that is there and is not a folder, or one that cannot be made or written.
-    pub fn claim(path: &Path) -> Result<Self, Failure> {
+    pub fn claim(path: &Path, names: &[&str]) -> Result<Self, Failure> {
         let refused = |why: &dyn std::fmt::Display| Failure::BadInput(format!("--out {}: {why}", path.display()));
         if path.as_os_str().is_empty() {
             return Err(refused(&"the name is empty; name a folder"));
@@ -37,9 +37,9 @@ impl Folder {
         // Dropped on the way out of an error, it takes away what was made.
         let folder = Self { path: path.to_path_buf(), made };
         std::fs::create_dir_all(path).map_err(|e| refused(&format!("the folder cannot be made: {e}")))?;
-        let trial = path.join(format!(".hysid.{}.partial", std::process::id()));
-        std::fs::write(&trial, b"").map_err(|e| refused(&format!("the folder cannot be written: {e}")))?;
-        std::fs::remove_file(&trial).map_err(|e| refused(&format!("the folder cannot be written: {e}")))?;
+        for name in names {
+            hysid_io::check_writable(&path.join(name)).map_err(|e| refused(&e))?;
+        }
         Ok(folder)
     }
 
