@@ -82,13 +82,39 @@ fn bad_input_ends_with_status_2_and_leaves_no_file() {
         (SIMULATION.to_owned(), csv(false).replace("0.50,1.0", "0.50,one"), "one"),
         (SIMULATION.to_owned(), csv(false).replace("0.50,1.0", "0.58,1.0"), "t_s"),
         (SIMULATION.to_owned(), String::new(), "in.csv"),
-        (explodes, csv(false), "state `x` explodes"),
-        (divides, csv(false), "the derivative of state `x` is inf at the first sample"),
+        (
+            SIMULATION.to_owned(),
+            csv(true).replace("0.50,1.0,", "0.50,1.0,oops"),
+            "in.csv, line 52, column `y_V`: `oops",
+        ),
+        (SIMULATION.to_owned(), csv(true).replace("1.99,1.0,", "1.99,1.0,1e"), "in.csv, line 201, column `y_V`"),
+        (explodes, csv(false), "`states.x.derivative`: state `x` explodes"),
+        (divides, csv(false), "`states.x.derivative`: the derivative of state `x` is inf at the first sample"),
+        (SIMULATION.replace("2*x", "2*x/(u - u)"), csv(true), "`outputs.twice_V`: output `twice_V` is"),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
         let failed = run(folder.path(), &simulation, &input).code(2);
         let stderr = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
-        assert!(stderr.contains(words), "{words}: {stderr}");
+        assert!(stderr.contains(words) && stderr.lines().count() == 1, "{words}: {stderr}");
         assert!(!folder.path().join("out.csv").exists());
     }
+}
+
+#[test]
+fn an_output_column_without_a_measurement_is_no_fault() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = (0..200).map(|n| format!("{:.2},1.0,,{n}\n", 0.01 * f64::from(n)));
+    let input = "t_s,u_V,y_V,twice_V\n".to_owned() + &rows.collect::<String>();
+    let told = run(folder.path(), SIMULATION, &input).success();
+    assert_eq!(String::from_utf8_lossy(&told.get_output().stderr), "free initial states (x): 0\n");
+}
+
+#[test]
+fn where_the_result_cannot_go_is_found_before_the_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::create_dir(folder.path().join("out.csv")).expect("a folder");
+    // The input's fault would be told first if it were read first.
+    let failed = run(folder.path(), SIMULATION, "").code(2);
+    let stderr = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
+    assert_eq!(stderr, "hysid: out.csv cannot be written: it is a folder; name a file\n");
 }
