@@ -3,6 +3,7 @@
 //! Exit status 0 on success whatever the verdict, 2 for bad input (one message that names what is wrong), 1 for a failure
 //! of the program itself.
 
+mod command_line;
 mod commands;
 mod failure;
 
@@ -48,7 +49,7 @@ fn provenance() -> hysid_report::Provenance {
 
 /// Runs one command line, the program's name first.
 fn run(line: impl IntoIterator<Item = OsString>) -> Result<(), Failure> {
-    match Cli::parse_from(line).command {
+    match command_line::parse::<Cli>(line)?.command {
         Command::Bench(args) => commands::bench::run(&args),
         Command::Decimate(args) => commands::decimate::run(&args),
         Command::Demo(args) => commands::demo::run(&args),

@@ -383,7 +383,10 @@ fn options_that_do_not_exist_or_do_not_go_together_are_refused() {
     let before = files_of(dir.path());
     for (args, fragment) in cases {
         let (status, _, stderr) = hysid(&args, dir.path());
-        assert!(status == 2 && stderr.starts_with("error:"), "{args:?}: {status} {stderr}");
+        assert!(
+            status == 2 && stderr.starts_with("hysid: ") && stderr.lines().count() == 1,
+            "{args:?}: {status} {stderr}"
+        );
         assert!(stderr.contains(fragment), "{args:?}: {stderr}");
         assert_eq!(files_of(dir.path()), before);
     }

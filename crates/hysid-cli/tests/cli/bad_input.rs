@@ -220,24 +220,39 @@ fn each_bad_request_ends_with_one_clear_message() {
         let (status, message) = run(args, dir.path());
         assert_eq!(status, 2, "{what}: {message}");
         assert!(message.contains(fragment), "{what}: `{fragment}` is not in {message}");
+        assert_eq!(message.trim_end().lines().count(), 1, "{what}: {message}");
         assert!(!message.contains("panicked"), "{what}: {message}");
         assert!(!dir.path().join("out.csv").exists() && !dir.path().join("out/model.json").exists(), "{what}");
     }
-    // Options that the parser itself refuses: its own message, of several lines.
-    let options = [
-        ("fit: no recording", vec!["fit", "--input", "u_V", "--output", "y_mm", "--out", "out"]),
-        ("fit: decimate x", with(&["--decimate", "x"])),
-        ("fit: criterion x", with(&["--criterion", "x"])),
-        ("fit: terms x", with(&["--terms", "x"])),
-        ("fit: factors x", with(&["--factors", "x"])),
-        ("decimate: method x", vec!["decimate", "rec.csv", "--output", "y_mm", "--method", "x"]),
-        ("decimate: largest 0", vec!["decimate", "rec.csv", "--output", "y_mm", "--largest", "0"]),
-        ("decimate: factor without out", vec!["decimate", "rec.csv", "--output", "y_mm", "--factor", "2"]),
-        ("unknown command", vec!["identify"]),
+    // Options that the parser itself refuses.
+    let options: [(&str, Vec<&str>, &str); 14] = [
+        (
+            "fit: no recording, no output",
+            vec!["fit", "--input", "u_V", "--out", "out"],
+            "required arguments were not provided: --recording <CSV> --output <COLUMN>; see `hysid fit --help`",
+        ),
+        ("fit: decimate x", with(&["--decimate", "x"]), "auto, none or a whole number"),
+        ("fit: criterion x", with(&["--criterion", "x"]), "press, aic, bic"),
+        ("fit: terms x", with(&["--terms", "x"]), "auto or a whole number"),
+        ("fit: terms -1", with(&["--terms", "-1"]), "auto or a whole number"),
+        ("fit: seed -5", with(&["--seed", "-5"]), "'-5' for '--seed <S>': a whole number of 0 or more is needed"),
+        ("fit: factors x", with(&["--factors", "x"]), "polynomial, hysteresis or auto"),
+        ("fit: misspelt", with(&["--holdouts", "x.csv"]), "'--holdouts' found; is `--holdout` meant?"),
+        (
+            "decimate: method x",
+            vec!["decimate", "rec.csv", "--output", "y_mm", "--method", "x"],
+            "'x' for '--method <METHOD>' [possible values: plain, chebyshev, kaiser]",
+        ),
+        ("decimate: largest 0", vec!["decimate", "rec.csv", "--output", "y_mm", "--largest", "0"], "1..=10000"),
+        ("decimate: alpha -1", vec!["decimate", "rec.csv", "--output", "y_mm", "--alpha", "-1"], "--alpha is -1"),
+        ("inspect: period -1", vec!["inspect", "no_clock.csv", "--period-s", "-1"], "period is -1 s"),
+        ("decimate: factor without out", vec!["decimate", "rec.csv", "--output", "y_mm", "--factor", "2"], "--out"),
+        ("unknown command", vec!["identify"], "'identify'; see `hysid --help`"),
     ];
-    for (what, args) in options {
+    for (what, args, fragment) in options {
         let (status, message) = run(&args, dir.path());
-        assert!(status == 2 && message.starts_with("error:"), "{what}: {status} {message}");
+        assert_eq!((status, message.trim_end().lines().count()), (2, 1), "{what}: {message}");
+        assert!(message.starts_with("hysid: ") && message.contains(fragment), "{what}: {message}");
     }
 }
 
