@@ -43,6 +43,16 @@ pub fn rk4<const N: usize>(x: &[f64; N], h: f64, f: impl Fn(f64, &[f64; N]) -> [
 /// More sub-steps than this are never taken in one sampling period, however stiff the law.
 const MOST_SUB_STEPS: u32 = 100_000;
 
+/// A number of sub-steps that can be taken.
+pub(crate) fn checked_sub_steps(count: usize) -> Result<u32, ParameterError> {
+    let possible = u32::try_from(count).ok().filter(|n| (1..=MOST_SUB_STEPS).contains(n));
+    let refused = || {
+        let allowed = format!("sub_steps must be 1 to {MOST_SUB_STEPS}");
+        Check("sampling").refuse(format_args!("sub_steps = {count}"), allowed)
+    };
+    possible.ok_or_else(refused)
+}
+
 /// A differential law with a sampling period: an [`Operator`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampled<L, const N: usize> {
@@ -66,10 +76,8 @@ impl<const N: usize, L: Differential<N>> Sampled<L, N> {
     /// # Errors
     /// The period is not a finite number above zero, or the sub-steps are not 1 to 100 000.
     pub fn new(law: L, period_s: f64, sub_steps: u32) -> Result<Self, ParameterError> {
-        let check = Check("sampling");
-        check.positive("period_s", period_s)?;
-        check.require("sub_steps", f64::from(sub_steps), (1..=MOST_SUB_STEPS).contains(&sub_steps), "1 to 100000")?;
-        Ok(Self { law, period_s, sub_steps })
+        Check("sampling").positive("period_s", period_s)?;
+        Ok(Self { law, period_s, sub_steps: checked_sub_steps(sub_steps as usize)? })
     }
 
     /// The law.

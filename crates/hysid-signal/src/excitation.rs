@@ -64,20 +64,23 @@ pub enum Excitation {
 
 /// What can be wrong with a request for a signal.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("excitation: {given} is not allowed; {allowed}")]
+#[error("excitation: {parameter} = {given} is not allowed; {parameter} must be {allowed}")]
 pub struct ExcitationError {
-    /// What was given.
+    /// The parameter's name: a field of [`Excitation`], `period_s`, `amplitude`, `band_hz` (lowest and highest frequency), `depth`.
+    pub parameter: &'static str,
+    /// Its value.
     pub given: String,
-    /// What is allowed.
+    /// What it must be.
     pub allowed: String,
 }
 
-fn require(holds: bool, name: &str, value: impl std::fmt::Display, what: &str) -> Result<(), ExcitationError> {
-    if holds {
-        Ok(())
-    } else {
-        Err(ExcitationError { given: format!("{name} = {value}"), allowed: format!("{name} must be {what}") })
-    }
+fn require(
+    holds: bool,
+    parameter: &'static str,
+    value: impl std::fmt::Display,
+    what: &str,
+) -> Result<(), ExcitationError> {
+    if holds { Ok(()) } else { Err(ExcitationError { parameter, given: value.to_string(), allowed: what.to_owned() }) }
 }
 
 impl Excitation {
@@ -103,7 +106,7 @@ impl Excitation {
 
     fn shape(&self, samples: usize, period_s: f64, seed: u64) -> Result<Vec<f64>, ExcitationError> {
         let nyquist = 0.5 / period_s;
-        let below_nyquist = |name: &str, f: f64| {
+        let below_nyquist = |name: &'static str, f: f64| {
             let what = format!("a number from 0 to the Nyquist frequency, {nyquist} Hz");
             require((0.0..=nyquist).contains(&f), name, f, &what)
         };
@@ -174,7 +177,7 @@ fn multisine(band_hz: (f64, f64), period: usize, period_s: f64, seed: u64) -> Re
     let last = ((band_hz.1 / spacing + 1e-9).floor() as usize).min((period.max(1) - 1) / 2);
     let what =
         format!("wide enough to hold one of the lines, which are {spacing} Hz apart, below the Nyquist frequency");
-    require(period > 0 && first <= last, "the band in Hz", format_args!("{} to {}", band_hz.0, band_hz.1), &what)?;
+    require(period > 0 && first <= last, "band_hz", format_args!("{} to {}", band_hz.0, band_hz.1), &what)?;
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut lines = vec![(0.0, 0.0); last + 1];
     for line in &mut lines[first..] {
@@ -215,7 +218,7 @@ const TAPS: [&[u32]; 18] = [
 fn prbs(order: u32, seed: u64) -> Result<impl Iterator<Item = f64>, ExcitationError> {
     let taps = (order as usize).checked_sub(3).and_then(|row| TAPS.get(row));
     let Some(taps) = taps else {
-        return Err(ExcitationError { given: format!("order = {order}"), allowed: "order must be 3 to 20".into() });
+        return Err(ExcitationError { parameter: "order", given: order.to_string(), allowed: "3 to 20".into() });
     };
     let mut register: u32 = Pcg64Mcg::seed_from_u64(seed).random_range(1..(1 << order));
     Ok(std::iter::repeat_with(move || {

@@ -8,7 +8,11 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use hysid_hysteresis::catalogue::{self, Entry, Kind};
-use hysid_signal::{Channel, Clock, Excitation, Recording, autoregressive_noise, modulate, variance_for_snr};
+use hysid_io::LARGEST_VALUE;
+use hysid_signal::tell::digits;
+use hysid_signal::{
+    Channel, Clock, Excitation, ExcitationError, Recording, autoregressive_noise, modulate, variance_for_snr,
+};
 
 use crate::failure::Failure;
 
@@ -135,9 +139,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let message = format!("generate: --samples {} is not allowed; it must be 2 to {MOST_SAMPLES}", args.samples);
         return Err(Failure::BadInput(message));
     }
-    if args.input.repeat.is_some_and(|repeat| repeat > MOST_SAMPLES) {
-        return Err(Failure::BadInput(format!("generate: --repeat must be at most {MOST_SAMPLES}")));
+    if let Some(repeat) = args.input.repeat.filter(|repeat| !(1..=MOST_SAMPLES).contains(repeat)) {
+        let message = format!("generate: --repeat {repeat} is not allowed; it must be 1 to {MOST_SAMPLES}");
+        return Err(Failure::BadInput(message));
     }
+    if !(args.period > 0.0 && args.period.is_finite()) {
+        let message = format!("generate: --period {} is not allowed; it must be a finite number above 0", args.period);
+        return Err(Failure::BadInput(message));
+    }
+    hysid_io::check_writable(out).map_err(Failure::bad_input)?;
     let recording = record(args, entry)?;
     hysid_io::write_recording(out, &recording).map_err(Failure::bad_input)?;
     let range = |channel: &Channel| {
@@ -161,9 +171,14 @@ fn record(args: &Args, entry: &Entry) -> Result<Recording, Failure> {
     let operator = entry.build(&args.set, args.period).map_err(Failure::bad_input)?;
     let u = args.input.signal(args.samples, args.period, args.seed)?;
     let mut y = operator.respond(&u);
-    if let Some(n) = y.iter().position(|y| !y.is_finite()) {
-        let message =
-            format!("generate: the output of {} is not finite from sample {n} on, input {}", entry.name, u[n]);
+    let beyond = |x: &f64| !(x.abs() <= LARGEST_VALUE);
+    if let Some(n) = u.iter().zip(&y).position(|(u, y)| beyond(u) || beyond(y)) {
+        let message = format!(
+            "generate: the recording would hold the input {} and the output {} of {} (sample {n}); the largest magnitude that a recording may hold is {LARGEST_VALUE:e}",
+            digits(u[n], 4),
+            digits(y[n], 4),
+            entry.name
+        );
         return Err(Failure::BadInput(message));
     }
     let variance = match (args.noise_variance, args.snr) {
@@ -219,10 +234,11 @@ impl Input {
         if !self.offset.is_finite() {
             return Err(Failure::BadInput(format!("generate: --offset {} is not a finite number", self.offset)));
         }
-        let mut u = shape.signal(samples, period_s, self.amplitude, seed).map_err(Failure::bad_input)?;
+        let mut u = shape.signal(samples, period_s, self.amplitude, seed).map_err(|e| refused(&e, "--frequency"))?;
         if self.modulation != 0.0 {
             let frequency_hz = self.modulation_frequency.unwrap_or(3.0 * once);
-            modulate(&mut u, period_s, self.modulation, frequency_hz).map_err(Failure::bad_input)?;
+            modulate(&mut u, period_s, self.modulation, frequency_hz)
+                .map_err(|e| refused(&e, "--modulation-frequency"))?;
         }
         for u in &mut u {
             *u += self.offset;
@@ -255,6 +271,25 @@ impl Input {
         }
         Ok(())
     }
+}
+
+/// The message of an excitation under the option that gives its parameter; `frequency` is the one for `frequency_hz`.
+fn refused(error: &ExcitationError, frequency: &'static str) -> Failure {
+    let option = match error.parameter {
+        "frequency_hz" => frequency,
+        "lowest_hz" | "from_hz" => "--from",
+        "highest_hz" | "to_hz" => "--to",
+        "band_hz" => "the band (--from to --to)",
+        "period_s" => "--period",
+        "amplitude" => "--amplitude",
+        "ratio" => "--ratio",
+        "order" => "--order",
+        "hold" => "--hold",
+        "depth" => "--modulation",
+        // A parameter that is new here is told by its own name.
+        other => other,
+    };
+    Failure::BadInput(format!("generate: {option} {} is not allowed; it must be {}", error.given, error.allowed))
 }
 
 fn name_and_value(text: &str) -> Result<(String, String), String> {

@@ -2,6 +2,7 @@
 
 use super::{Entry, Made, Parameter, Values};
 use crate::conformance::{Law, Laws};
+use crate::differential::checked_sub_steps;
 use crate::error::Check;
 use crate::preisach::{Density, Diagonal, Fields, Levels, PreisachPlane, Start};
 use crate::*;
@@ -18,7 +19,7 @@ pub fn find(name: &str) -> Option<&'static Entry> {
 
 /// A differential law made into an operator.
 fn sampled<const N: usize, L: Differential<N> + 'static>(law: L, values: &Values, period_s: f64) -> Made {
-    let sub_steps = u32::try_from(values.count("sub_steps")).unwrap_or(u32::MAX);
+    let sub_steps = checked_sub_steps(values.count("sub_steps"))?;
     Ok(Box::new(Sampled::new(law, period_s, sub_steps)?))
 }
 

@@ -106,7 +106,7 @@ impl Values {
                 (Kind::Number(_), Some(text)) => Value::Number(text.parse().map_err(|_| refuse("a number".into()))?),
                 (Kind::Count(default), None) => Value::Count(default),
                 (Kind::Count(_), Some(text)) => {
-                    Value::Count(text.parse().map_err(|_| refuse("a whole number of 0 or more".into()))?)
+                    Value::Count(whole(text).ok_or_else(|| refuse("a whole number of 0 or more".into()))?)
                 }
                 (Kind::Choice(choices), None) => Value::Choice(choices[0]),
                 (Kind::Choice(choices), Some(text)) => match choices.iter().find(|choice| **choice == text) {
@@ -137,4 +137,14 @@ impl Values {
     pub(super) fn choice(&self, name: &str) -> &'static str {
         if let Some(Value::Choice(c)) = self.value(name) { c } else { "" }
     }
+}
+
+/// A whole number, however it is written: `1e3` is one.
+fn whole(text: &str) -> Option<usize> {
+    let as_number = || {
+        let value: f64 = text.parse().ok()?;
+        // The largest `usize` stands for all beyond it, which every operator refuses.
+        (value >= 0.0 && value.fract() == 0.0).then_some(value as usize)
+    };
+    text.parse().ok().or_else(as_number)
 }
