@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use hysid_decimate::{Decimator, FactorRow, Phase, Recommendation, examine, recommend, reduce};
-use hysid_io::{ReadOptions, TimeSource, check_writable, read_recording, require, write_recording};
+use hysid_decimate::{DecimateError, Decimator, FactorRow, Phase, Recommendation, examine, recommend, reduce};
+use hysid_io::{ReadOptions, check_writable, read_recording, require, write_recording};
 use serde_json::{Value, json};
 
-use super::files::keep_inputs;
+use super::files::{clock_or_period, keep_inputs};
 use crate::failure::Failure;
 
 /// The table of sampling-rate reductions of a recording, and which factor to take.
@@ -46,6 +46,9 @@ pub struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// Samples of a recording that other commands read again: one has no sampling period.
+const FEWEST_WRITTEN: usize = 2;
 
 /// A decimator's name on the command line.
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -90,18 +93,23 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let mut columns: Vec<String> = args.input.clone();
     columns.push(args.output.clone());
-    let time = args.period_s.map_or_else(TimeSource::default, |p| TimeSource::ColumnOrPeriod("t_s".into(), p));
+    let time = clock_or_period(&args.recording, args.period_s)?;
     let recording =
         read_recording(&args.recording, &ReadOptions { time, columns: Some(columns) }).map_err(Failure::bad_input)?;
     require::varying(&recording, &args.output).map_err(Failure::bad_input)?;
     let inputs: Vec<&str> = args.input.iter().map(String::as_str).collect();
-    let rows = examine(&recording, &args.output, &inputs, decimator, phase, args.largest as usize)
-        .map_err(Failure::bad_input)?;
+    let refused = |e: DecimateError| Failure::BadInput(format!("{}: {e}", args.recording.display()));
+    let rows = examine(&recording, &args.output, &inputs, decimator, phase, args.largest as usize).map_err(refused)?;
     let advice = recommend(&rows, args.alpha);
     if let Some(out) = &args.out {
         let factor = args.factor.map_or(advice.factor, |f| f as usize);
         let names: Vec<&str> = inputs.iter().copied().chain([args.output.as_str()]).collect();
-        let reduced = reduce(&recording, &names, factor, decimator, phase).map_err(Failure::bad_input)?;
+        let reduced = reduce(&recording, &names, factor, decimator, phase).map_err(refused)?;
+        let (samples, left) = reduced.samples;
+        if left < FEWEST_WRITTEN {
+            let needed = FEWEST_WRITTEN;
+            return Err(refused(DecimateError::TooFewSamples { samples, factor, left, needed }));
+        }
         write_recording(out, &reduced.recording).map_err(Failure::bad_input)?;
     }
     if args.json {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hysid_io::{ReadOptions, read_recording};
+use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_signal::Recording;
 use hysid_signal::tell::digits;
 
@@ -83,20 +83,40 @@ pub fn no_samples_twice(
     Ok(())
 }
 
-/// Refuses a simulation that says its period for a recording whose time column says another.
+/// Refuses a sampling period that is said of a recording whose time column says another; `said` is told as `by`, with what to do.
 ///
 /// # Errors
-/// Both periods, and what to write.
-pub fn same_clock(file: &Path, said: f64) -> Result<(), Failure> {
+/// Both periods, and what to do.
+pub fn same_clock(file: &Path, said: f64, by: &str, remedy: &str) -> Result<(), Failure> {
     let clock_only = ReadOptions { columns: Some(Vec::new()), ..ReadOptions::default() };
     let Ok(recording) = read_recording(file, &clock_only) else { return Ok(()) };
     let found = recording.clock().period_s;
     if (found - said).abs() > SAME_PERIOD * said {
         return Err(Failure::BadInput(format!(
-            "{}, column `{TIME}`: the sampling period is {} s, but the simulation says `period_s = {said}`; write `column = \"{TIME}\"` in [time] to go by the recording",
+            "{}, column `{TIME}`: the sampling period is {} s, but {by}; {remedy}",
             file.display(),
             digits(found, 6)
         )));
     }
     Ok(())
+}
+
+/// The same for the period that a simulation says.
+///
+/// # Errors
+/// As of [`same_clock`].
+pub fn same_clock_as_simulation(file: &Path, said: f64) -> Result<(), Failure> {
+    let by = format!("the simulation says `period_s = {said}`");
+    same_clock(file, said, &by, &format!("write `column = \"{TIME}\"` in [time] to go by the recording"))
+}
+
+/// Where the clock of a recording comes from: its column `t_s`, else `--period-s`, which must not contradict it.
+///
+/// # Errors
+/// As of [`same_clock`].
+pub fn clock_or_period(file: &Path, period_s: Option<f64>) -> Result<TimeSource, Failure> {
+    let Some(said) = period_s else { return Ok(TimeSource::default()) };
+    let remedy = "leave the option out to go by the recording";
+    same_clock(file, said, &format!("--period-s says {said} s"), remedy)?;
+    Ok(TimeSource::ColumnOrPeriod(TIME.into(), said))
 }

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
-use hysid_io::{CsvChunks, ReadOptions, TimeSource, fit_clock, read_recording};
+use hysid_io::{CsvChunks, ReadOptions, fit_clock, read_recording};
 use hysid_signal::{Recording, turning_points};
 use hysid_validate::loop_areas;
 use serde_json::{Value, json};
 
 use crate::commands::channel_facts::{ChannelFacts, channel_facts};
+use crate::commands::files::clock_or_period;
 use crate::failure::Failure;
 
 /// What is in a recording: channels, clock, gaps, clipping, resolution, periods, loops.
@@ -41,7 +42,7 @@ struct Loops {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let time = args.period_s.map_or_else(TimeSource::default, |p| TimeSource::ColumnOrPeriod("t_s".into(), p));
+    let time = clock_or_period(&args.recording, args.period_s)?;
     let recording =
         read_recording(&args.recording, &ReadOptions { time, columns: None }).map_err(Failure::bad_input)?;
     let jitter = jitter(args)?;

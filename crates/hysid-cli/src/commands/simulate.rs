@@ -10,7 +10,7 @@ use hysid_plant::{ClockSource, Compiled, Data, Drive, Run, Simulation, Start};
 use hysid_signal::Recording;
 use hysid_signal::tell::counted;
 
-use super::files::{keep_inputs, same_clock};
+use super::files::{keep_inputs, same_clock_as_simulation};
 use crate::failure::Failure;
 
 /// Run a simulation file on a recording's inputs.
@@ -64,7 +64,7 @@ fn read(path: &Path, simulation: &Simulation) -> Result<(Recording, Measured), F
     let time = match &simulation.time.clock {
         ClockSource::Column(column) => TimeSource::Column(column.clone()),
         ClockSource::Period(period_s) => {
-            same_clock(path, *period_s)?;
+            same_clock_as_simulation(path, *period_s)?;
             TimeSource::Period(*period_s)
         }
     };

@@ -149,6 +149,21 @@ fn each_bad_request_ends_with_one_clear_message() {
             "leave 0",
         ),
         (
+            "one row left",
+            vec!["decimate", "rec.csv", "--output", "y_mm", "--factor", "500", "--out", "out.csv"],
+            "rec.csv: 300 samples, every 500th of which is kept, leave 1; at least 2 are needed",
+        ),
+        (
+            "period beside a clock",
+            vec!["inspect", "rec.csv", "--period-s", "0.5"],
+            "rec.csv, column `t_s`: the sampling period is 0.01 s, but --period-s says 0.5 s",
+        ),
+        (
+            "decimate: period beside a clock",
+            vec!["decimate", "rec.csv", "--output", "y_mm", "--period-s", "0.5"],
+            "--period-s says 0.5 s",
+        ),
+        (
             "folder as output",
             vec!["decimate", "rec.csv", "--output", "y_mm", "--out", "folder"],
             "folder cannot be written",

@@ -7,7 +7,7 @@ use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_plant::{ClockSource, Simulation};
 use hysid_signal::Recording;
 
-use crate::commands::files::{no_file_twice, no_samples_twice, same_clock};
+use crate::commands::files::{no_file_twice, no_samples_twice, same_clock_as_simulation};
 use crate::failure::Failure;
 
 /// Estimation and hold-out recordings.
@@ -75,7 +75,7 @@ impl Files<'_> {
 fn read(file: &Path, options: &ReadOptions) -> Result<Recording, Failure> {
     let recording = read_recording(file, options).map_err(Failure::bad_input)?;
     if let TimeSource::Period(said) = options.time {
-        same_clock(file, said)?;
+        same_clock_as_simulation(file, said)?;
     }
     Ok(recording)
 }
