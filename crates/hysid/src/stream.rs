@@ -53,8 +53,8 @@ pub enum StreamError {
 /// `progress` is told the bytes read so far.
 ///
 /// # Errors
-/// The first thing wrong in the file, with line and column; a dictionary that is too large or has no row with all its lags; options out of
-/// range.
+/// The first thing wrong in the file, with line and column; an output that never changes; a dictionary that is too large or has no row with all
+/// its lags; options out of range.
 pub fn select_file(
     file: &Path,
     time: Option<&str>,
@@ -71,6 +71,7 @@ pub fn select_file(
         .chain(time)
         .collect();
     let mut clock = ClockWatch::new();
+    let mut output = Values::default();
     let (rows, bytes) = for_each_chunk(file, &columns, progress, |chunk, stream| {
         if let (Some(name), Some(t)) = (time, chunk.columns.get(columns.len() - 1)) {
             clock.judge(t, stream.decimals(columns.len() - 1)).map_err(|(n, problem)| match chunk.lines.get(n) {
@@ -78,6 +79,7 @@ pub fn select_file(
                 None => InputError::in_column(file, name, problem),
             })?;
         }
+        output.see(&chunk.columns[0]);
         let inputs = chunk.columns[1..=signals.inputs().len()].iter().map(Vec::as_slice).collect();
         Ok(sums.push(&Record::new(&chunk.columns[0], inputs))?)
     })?;
@@ -87,8 +89,33 @@ pub fn select_file(
     }
     let unfit = |problem: String| StreamError::Unfit { file: file.to_path_buf(), problem };
     let gram = sums.finish().map_err(|e| unfit(e.to_string()))?;
+    if let Some(problem) = output.problem() {
+        return Err(InputError::in_column(file, &signals.output().column, problem).into());
+    }
     let selection = select_gram(&gram, options).map_err(|e| unfit(e.to_string()))?;
     Ok(Streamed { selection, rows, bytes, period_s: clock.period_s(), distinct_sums })
+}
+
+/// Whether a column takes more than one value.
+#[derive(Debug, Default)]
+struct Values {
+    first: Option<f64>,
+    vary: bool,
+}
+
+impl Values {
+    fn see(&mut self, samples: &[f64]) {
+        for &x in samples.iter().filter(|x| x.is_finite()) {
+            self.vary |= *self.first.get_or_insert(x) != x;
+        }
+    }
+
+    fn problem(&self) -> Option<InputProblem> {
+        match self.first {
+            None => Some(InputProblem::AllMissing),
+            Some(value) => (!self.vary).then_some(InputProblem::Constant(value)),
+        }
+    }
 }
 
 /// Reads a file to its end, chunk by chunk; returns its rows and bytes.

@@ -135,7 +135,16 @@ fn bad_input_ends_it_with_one_message() {
         (
             file((0..300).map(|n| format!("{:.1},{},0\n", 0.1 * n as f64, n % 7)).collect()),
             &[],
-            &["r.csv", "zero throughout"],
+            &["r.csv, column `y`", "constant (0)"],
+        ),
+        (
+            file(
+                (0..300)
+                    .map(|n| format!("{:.1},{},{}\n", 0.1 * n as f64, n % 7, if n % 9 == 4 { "" } else { "0.5" }))
+                    .collect(),
+            ),
+            &[],
+            &["r.csv, column `y`", "constant (0.5)"],
         ),
         (file(good.clone()), &["--output", "z"], &["r.csv, column `z`", "`t_s`, `u`, `y`"]),
         (file(good.clone()), &["--input", "u"], &["two signals"]),
