@@ -1,4 +1,6 @@
 //! What a caller may need of a recording, judged with one clear message: a column that exists, varies and is long enough.
+//!
+//! `file` is the path by which messages name the recording: that which the user gave, with its folders.
 
 use std::path::Path;
 
@@ -10,10 +12,10 @@ use crate::error::{InputError, InputProblem, listed};
 ///
 /// # Errors
 /// [`InputProblem::MissingColumn`], with the names that there are.
-pub fn channel<'a>(recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
+pub fn channel<'a>(file: &Path, recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
     recording.channel(name).ok_or_else(|| {
         let has = listed(recording.channels().iter().map(|c| c.name.as_str()));
-        InputError::in_column(Path::new(recording.name()), name, InputProblem::MissingColumn(has))
+        InputError::in_column(file, name, InputProblem::MissingColumn(has))
     })
 }
 
@@ -21,10 +23,9 @@ pub fn channel<'a>(recording: &'a Recording, name: &str) -> Result<&'a Channel, 
 ///
 /// # Errors
 /// As [`channel`]; [`InputProblem::AllMissing`]; [`InputProblem::Constant`].
-pub fn varying<'a>(recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
-    let found = channel(recording, name)?;
+pub fn varying<'a>(file: &Path, recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
+    let found = channel(file, recording, name)?;
     let mut present = found.samples.iter().copied().filter(|x| x.is_finite());
-    let file = Path::new(recording.name());
     let Some(first) = present.next() else {
         return Err(InputError::in_column(file, name, InputProblem::AllMissing));
     };
@@ -38,14 +39,14 @@ pub fn varying<'a>(recording: &'a Recording, name: &str) -> Result<&'a Channel, 
 ///
 /// # Errors
 /// As [`channel`]; [`InputProblem::TooFewSamples`].
-pub fn samples(recording: &Recording, names: &[&str], needed: usize) -> Result<usize, InputError> {
+pub fn samples(file: &Path, recording: &Recording, names: &[&str], needed: usize) -> Result<usize, InputError> {
     for name in names {
-        channel(recording, name)?;
+        channel(file, recording, name)?;
     }
     let found = recording.segments(names).iter().map(ExactSizeIterator::len).sum();
     if found < needed {
         let problem = InputProblem::TooFewSamples { found, needed };
-        return Err(InputError::whole(Path::new(recording.name()), problem));
+        return Err(InputError::whole(file, problem));
     }
     Ok(found)
 }

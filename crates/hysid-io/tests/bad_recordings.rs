@@ -155,12 +155,15 @@ fn good_recordings_are_read_as_they_are() {
 fn callers_judge_what_they_need() {
     let dir = tempfile::tempdir().unwrap();
     let r = read(dir.path(), b"t_s,u_V,y_mm\n0,1,2\n1,1,\n2,1,3\n", &ReadOptions::default()).unwrap();
-    assert!(require::varying(&r, "y_mm").is_ok());
-    assert_eq!(require::varying(&r, "u_V").unwrap_err().problem, P::Constant(1.0));
-    assert!(matches!(require::channel(&r, "x").unwrap_err().problem, P::MissingColumn(_)));
-    assert_eq!(require::samples(&r, &["u_V", "y_mm"], 2), Ok(2));
+    let file = Path::new("folder/rec.csv");
+    assert!(require::varying(file, &r, "y_mm").is_ok());
+    assert_eq!(require::varying(file, &r, "u_V").unwrap_err().problem, P::Constant(1.0));
+    assert!(matches!(require::channel(file, &r, "x").unwrap_err().problem, P::MissingColumn(_)));
+    assert_eq!(require::samples(file, &r, &["u_V", "y_mm"], 2), Ok(2));
     assert_eq!(
-        require::samples(&r, &["u_V", "y_mm"], 3).unwrap_err().problem,
+        require::samples(file, &r, &["u_V", "y_mm"], 3).unwrap_err().problem,
         P::TooFewSamples { found: 2, needed: 3 }
     );
+    let told = require::varying(file, &r, "u_V").unwrap_err().to_string();
+    assert!(told.starts_with("folder/rec.csv, column `u_V`: "), "{told}");
 }

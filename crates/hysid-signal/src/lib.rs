@@ -9,6 +9,7 @@ mod cosine;
 mod excitation;
 mod median;
 mod noise;
+mod overlap;
 mod range;
 mod recording;
 mod spectrum;
@@ -20,6 +21,7 @@ pub use cosine::{cosine_transform, inverse_cosine_transform};
 pub use excitation::{Excitation, ExcitationError, modulate};
 pub use median::median;
 pub use noise::{NoiseError, autoregressive_noise, variance_for_snr, white_noise};
+pub use overlap::rows_in_both;
 pub use range::range;
 pub use recording::{Channel, Clock, Recording, RecordingError, Segment};
 pub use spectrum::{

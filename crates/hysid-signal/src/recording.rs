@@ -98,6 +98,11 @@ impl Recording {
         &self.name
     }
 
+    /// The same recording under another name.
+    pub fn named(self, name: impl Into<String>) -> Self {
+        Self { name: name.into(), ..self }
+    }
+
     /// The clock.
     pub fn clock(&self) -> Clock {
         self.clock

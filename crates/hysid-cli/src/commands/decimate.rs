@@ -96,7 +96,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let time = clock_or_period(&args.recording, args.period_s)?;
     let recording =
         read_recording(&args.recording, &ReadOptions { time, columns: Some(columns) }).map_err(Failure::bad_input)?;
-    require::varying(&recording, &args.output).map_err(Failure::bad_input)?;
+    require::varying(&args.recording, &recording, &args.output).map_err(Failure::bad_input)?;
     let inputs: Vec<&str> = args.input.iter().map(String::as_str).collect();
     let refused = |e: DecimateError| Failure::BadInput(format!("{}: {e}", args.recording.display()));
     let rows = examine(&recording, &args.output, &inputs, decimator, phase, args.largest as usize).map_err(refused)?;

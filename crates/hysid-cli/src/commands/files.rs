@@ -1,10 +1,11 @@
-//! The files of a command held against each other: no result over what it was made from, no hold-out that was learnt from, one clock.
+//! The files and columns of a command held against each other: no result over what it was made from, no hold-out that was learnt from, one clock,
+//! no column that is two signals.
 
 use std::path::{Path, PathBuf};
 
 use hysid_io::{ReadOptions, TimeSource, read_recording};
-use hysid_signal::Recording;
-use hysid_signal::tell::digits;
+use hysid_signal::tell::{brief, digits};
+use hysid_signal::{Recording, rows_in_both};
 
 use super::fit::TIME;
 use crate::failure::Failure;
@@ -63,21 +64,79 @@ pub fn no_file_twice(estimation: &[PathBuf], holdout: &[PathBuf]) -> Result<(), 
     Ok(())
 }
 
-/// Refuses a hold-out with the samples of a recording that is learnt from, each given with its file.
+/// The recordings of a command, held against each other.
+#[derive(Debug)]
+pub struct Intake {
+    /// To estimate from.
+    pub estimation: Vec<Recording>,
+    /// To score on only.
+    pub holdout: Vec<Recording>,
+}
+
+/// Share of a hold-out's rows from which it is not what the estimation never sees.
+const MOST_IN_COMMON: f64 = 0.1;
+
+impl Intake {
+    /// Recordings with the files that they were read from. Two that would have the same name (that of the file without its folders) are named by
+    /// their paths.
+    ///
+    /// # Errors
+    /// A hold-out with the samples of a recording that is learnt from, or with a part of them.
+    pub fn new(
+        estimation: (&[PathBuf], Vec<Recording>),
+        holdout: (&[PathBuf], Vec<Recording>),
+    ) -> Result<Self, Failure> {
+        for (file, h) in holdout.0.iter().zip(&holdout.1) {
+            for (learnt, e) in estimation.0.iter().zip(&estimation.1) {
+                let same = rows_in_both(h, e);
+                let what = if e.same_samples(h) {
+                    format!("it holds the same data as {}, which", learnt.display())
+                } else if same as f64 >= MOST_IN_COMMON * h.len() as f64 && same > 0 {
+                    format!("{same} of its {} rows stand in {}, too, which", h.len(), learnt.display())
+                } else {
+                    continue;
+                };
+                return Err(Failure::BadInput(format!(
+                    "{}: {what} is a --recording; the hold-out must be data that the estimation never sees",
+                    file.display()
+                )));
+            }
+        }
+        let names: Vec<String> = estimation.1.iter().chain(&holdout.1).map(|r| r.name().to_owned()).collect();
+        let told_apart = |(files, recordings): (&[PathBuf], Vec<Recording>)| {
+            let twice = |r: &Recording| names.iter().filter(|n| *n == r.name()).count() > 1;
+            let named = |(file, r): (&PathBuf, Recording)| {
+                if twice(&r) { r.named(file.display().to_string()) } else { r }
+            };
+            files.iter().zip(recordings).map(named).collect()
+        };
+        Ok(Self { estimation: told_apart(estimation), holdout: told_apart(holdout) })
+    }
+
+    /// The path by which the user named the recording of this name, of those that were read from `estimation` and `holdout`.
+    pub fn path<'a>(&self, name: &str, estimation: &'a [PathBuf], holdout: &'a [PathBuf]) -> Option<&'a Path> {
+        let mut all = self.estimation.iter().zip(estimation).chain(self.holdout.iter().zip(holdout));
+        all.find(|(r, _)| r.name() == name).map(|(_, path)| path.as_path())
+    }
+}
+
+/// Refuses a column that is given for two signals, and the time column as a signal; each column with the option that gives it.
 ///
 /// # Errors
-/// The files that hold the same samples.
-pub fn no_samples_twice(
-    estimation: (&[PathBuf], &[Recording]),
-    holdout: (&[PathBuf], &[Recording]),
-) -> Result<(), Failure> {
-    for (file, h) in holdout.0.iter().zip(holdout.1) {
-        if let Some((same, _)) = estimation.0.iter().zip(estimation.1).find(|(_, e)| e.same_samples(h)) {
+/// The option and the column.
+pub fn different_signals(given: &[(&str, &str)]) -> Result<(), Failure> {
+    for (i, (option, column)) in given.iter().enumerate() {
+        if given[..i].iter().any(|(_, before)| before == column) {
+            let mut options: Vec<&str> = given.iter().map(|g| g.0).collect();
+            options.dedup();
             return Err(Failure::BadInput(format!(
-                "{}: it holds the same data as {}, which is a --recording; the hold-out must be data that the estimation never sees",
-                file.display(),
-                same.display()
+                "{option} {}: this column is given twice; each of {} must name another one",
+                brief(column),
+                options.join(", ")
             )));
+        }
+        if *column == TIME {
+            return Err(Failure::BadInput(format!("{option} {TIME}: this is the time column, not a signal")));
         }
     }
     Ok(())

@@ -6,10 +6,9 @@ use std::time::Duration;
 use hysid::identify::{Criterion, Decimate, Factors, FitReport, IdentifyError, Options, Source, identify};
 use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require};
 use hysid_signal::Recording;
-use hysid_signal::tell::brief;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::files::{keep_inputs, no_file_twice, no_samples_twice};
+use super::files::{Intake, different_signals, keep_inputs, no_file_twice};
 use super::folder::Folder;
 use super::threads::pool;
 use crate::failure::Failure;
@@ -107,7 +106,7 @@ fn criterion(text: &str) -> Result<Criterion, String> {
     }
 }
 
-/// The clock's column where the file has it; without one, samples are counted in seconds.
+/// The clock's column where the file has it.
 pub(crate) const TIME: &str = "t_s";
 
 /// The files that go into the folder.
@@ -116,12 +115,15 @@ const SUMMARY: &str = "fit.json";
 const PAGE: &str = "report.html";
 const NAMES: [&str; 3] = [MODEL, SUMMARY, PAGE];
 
-/// Samples without which no recording can teach even a linear model and hold some back to judge it.
+/// Samples without which no recording can teach even a linear model and hold some back to judge it, nor judge one.
 const FEWEST_SAMPLES: usize = 20;
 
-/// Reads the named columns of a recording.
-pub(crate) fn read(path: &Path, columns: &[&str]) -> Result<Recording, Failure> {
-    let time = TimeSource::ColumnOrPeriod(TIME.into(), 1.0);
+/// The sampling period in seconds of a recording that does not tell one.
+pub(crate) const WITHOUT_CLOCK: f64 = 1.0;
+
+/// Reads the named columns of a recording; `period_s` is its sampling period where it has no time column.
+pub(crate) fn read(path: &Path, columns: &[&str], period_s: f64) -> Result<Recording, Failure> {
+    let time = TimeSource::ColumnOrPeriod(TIME.into(), period_s);
     let options = ReadOptions { time, columns: Some(columns.iter().map(|c| (*c).to_string()).collect()) };
     read_recording(path, &options).map_err(Failure::bad_input)
 }
@@ -151,39 +153,32 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let pool = pool(args.threads)?;
     keep_inputs(&args.out, &NAMES, args.recordings.iter().chain(&args.holdouts))?;
     no_file_twice(&args.recordings, &args.holdouts)?;
-    let mut columns: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
-    columns.push(&args.output);
-    for (i, c) in columns.iter().enumerate() {
-        let option = if i < args.inputs.len() { "--input" } else { "--output" };
-        if columns[..i].contains(c) {
-            return Err(Failure::BadInput(format!(
-                "{option} {}: this column is given twice; every --input and --output must be a different one",
-                brief(c)
-            )));
-        }
-        if *c == TIME {
-            return Err(Failure::BadInput(format!("{option} {TIME}: this is the time column, not a signal")));
-        }
-    }
-    let read_all = |paths: &[PathBuf]| paths.iter().map(|p| read(p, &columns)).collect::<Result<Vec<_>, _>>();
-    let (estimation, holdout) = (read_all(&args.recordings)?, read_all(&args.holdouts)?);
-    no_samples_twice((&args.recordings, &estimation), (&args.holdouts, &holdout))?;
-    for recording in estimation.iter().chain(&holdout) {
-        require::varying(recording, &args.output).map_err(Failure::bad_input)?;
-    }
-    for recording in &estimation {
-        require::samples(recording, &columns, FEWEST_SAMPLES).map_err(Failure::bad_input)?;
+    let signals: Vec<(&str, &str)> =
+        args.inputs.iter().map(|u| ("--input", u.as_str())).chain([("--output", args.output.as_str())]).collect();
+    different_signals(&signals)?;
+    let columns: Vec<&str> = signals.iter().map(|s| s.1).collect();
+    let read_all =
+        |paths: &[PathBuf], period: f64| paths.iter().map(|p| read(p, &columns, period)).collect::<Result<Vec<_>, _>>();
+    let estimation = read_all(&args.recordings, WITHOUT_CLOCK)?;
+    // A hold-out without a clock is taken at the rate of what was learnt from.
+    let rate = estimation.first().map_or(WITHOUT_CLOCK, |r| r.clock().period_s);
+    let holdout = read_all(&args.holdouts, rate)?;
+    let intake = Intake::new((&args.recordings, estimation), (&args.holdouts, holdout))?;
+    let (estimation, holdout) = (&intake.estimation, &intake.holdout);
+    for (file, recording) in args.recordings.iter().zip(estimation).chain(args.holdouts.iter().zip(holdout)) {
+        require::varying(file, recording, &args.output).map_err(Failure::bad_input)?;
+        require::samples(file, recording, &columns, FEWEST_SAMPLES).map_err(Failure::bad_input)?;
     }
     let folder = Folder::claim(&args.out, &NAMES)?;
     let bar = progress();
-    let source = Source { recordings: &estimation, inputs: &args.inputs, output: &args.output };
+    let source = Source { recordings: estimation, inputs: &args.inputs, output: &args.output };
     let found = pool.install(|| identify(source, &options, &|what| bar.set_message(what.to_string())));
     bar.finish_and_clear();
     let mut found = found.map_err(|e| told(&args.recordings, &e))?;
     if !has_clock(&args.recordings[0])? {
         found.model = found.model.without_clock();
     }
-    let report = FitReport::new(&found, &estimation, &holdout, args.seed).map_err(|e| told(&args.recordings, &e))?;
+    let report = FitReport::new(&found, estimation, holdout, args.seed).map_err(|e| told(&args.recordings, &e))?;
     found.model.save(&args.out.join(MODEL)).map_err(anyhow::Error::from)?;
     folder.json(SUMMARY, &report.summary)?;
     folder.text(PAGE, &hysid_report::fit::page(&report, &crate::provenance()))?;

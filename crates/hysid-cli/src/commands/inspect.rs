@@ -47,7 +47,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         read_recording(&args.recording, &ReadOptions { time, columns: None }).map_err(Failure::bad_input)?;
     let jitter = jitter(args)?;
     let input = match &args.input {
-        Some(name) => Some(hysid_io::require::channel(&recording, name).map_err(Failure::bad_input)?.name.clone()),
+        Some(name) => Some(
+            hysid_io::require::channel(&args.recording, &recording, name).map_err(Failure::bad_input)?.name.clone(),
+        ),
         None => recording.channels().first().map(|c| c.name.clone()),
     };
     let facts: Vec<ChannelFacts> =

@@ -7,7 +7,7 @@ use hysid_narx::NarxModel;
 use hysid_signal::tell::digits;
 
 use super::files::keep_inputs;
-use super::fit::{TIME, has_clock, read};
+use super::fit::{TIME, WITHOUT_CLOCK, has_clock, read};
 use crate::failure::Failure;
 
 /// Predict a recording's output with a model.
@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let output = model.signals().output().column.clone();
     let mut columns = model.input_columns();
     columns.push(&output);
-    let recording = read(&args.recording, &columns)?;
+    let recording = read(&args.recording, &columns, WITHOUT_CLOCK)?;
     let clock = has_clock(&args.recording)?;
     if let Some(made) = model.parts().period_s.filter(|_| clock) {
         same_rate(args, made, recording.clock().period_s)?;

@@ -15,6 +15,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::bench::{cpu_seconds, load_average, status};
+use super::files::different_signals;
 use super::fit::{AutoOr, TIME, terms};
 use super::threads::pool;
 use crate::failure::Failure;
@@ -94,7 +95,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.input_delay > 1 {
         return Err(Failure::BadInput(format!("--input-delay is {}; it must be 0 or 1", args.input_delay)));
     }
+    if args.terms.0 == Some(0) {
+        return Err(Failure::BadInput("--terms is 0; it must be auto, or 1 or more".into()));
+    }
     let inputs: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
+    let signals = inputs.iter().map(|u| ("--input", *u)).chain([("--output", args.output.as_str())]);
+    different_signals(&signals.collect::<Vec<_>>())?;
     let signals = Signals::from_columns(&args.output, &inputs).map_err(Failure::bad_input)?;
     let lags = args.input_delay..=args.lags_input;
     let dictionary = Spec::narx(signals, args.lags_output, lags, args.degree).build().map_err(Failure::bad_input)?;
@@ -108,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let options = Options { search, criterion, ..Options::default() };
     let header = CsvChunks::open(&args.recording, None, 1).map_err(Failure::bad_input)?.header().to_vec();
-    let time = header.iter().any(|h| h == TIME && *h != args.output && !args.inputs.contains(h)).then_some(TIME);
+    let time = header.iter().any(|h| h == TIME).then_some(TIME);
     let (began, cpu_began) = (Instant::now(), cpu_seconds());
     let timing = |bytes: u64| {
         let wall = began.elapsed().as_secs_f64();

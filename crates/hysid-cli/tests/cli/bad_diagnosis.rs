@@ -308,8 +308,10 @@ fn requests() -> Vec<Case> {
         columns("the simulated column is not there", "s_m", "z_m", &["est.csv, column `z_m`", "`s_m`"]),
         columns("the input is not there", "u_N", "z_N", &["est.csv, column `z_N`"]),
         columns("the output is not there", "x_m", "z_m", &["est.csv, column `z_m`"]),
-        columns("the simulated column is the output", "s_m", "x_m", &["column `x_m` is given twice"]),
-        columns("the input is the output", "u_N", "x_m", &["column `x_m` is given twice"]),
+        columns("the simulated column is the output", "s_m", "x_m", &["--simulated x_m: this column is given twice"]),
+        columns("the input is the output", "u_N", "x_m", &["--output x_m: this column is given twice"]),
+        columns("the time is the input", "u_N", "t_s", &["--input t_s: this is the time column"]),
+        columns("the time is the output", "x_m", "t_s", &["--output t_s: this is the time column"]),
         case(
             "no clock in column mode",
             recording("est.csv", |t| t.replacen("t_s", "n", 1)),

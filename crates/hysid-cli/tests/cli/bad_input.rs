@@ -125,6 +125,7 @@ fn each_bad_request_ends_with_one_clear_message() {
     std::fs::write(dir.path().join("array.json"), "[]").unwrap();
     std::fs::create_dir_all(dir.path().join("taken/fit.json")).unwrap();
     std::fs::create_dir(dir.path().join("folder")).unwrap();
+    std::fs::write(dir.path().join("folder/in.csv"), good()).unwrap();
     let fit = ["fit", "--recording", "rec.csv", "--input", "u_V", "--output", "y_mm", "--out", "out"];
     let with = |more: &[&'static str]| fit.iter().copied().chain(more.iter().copied()).collect::<Vec<_>>();
     let cases: Vec<(&str, Vec<&str>, &str)> = vec![
@@ -135,7 +136,11 @@ fn each_bad_request_ends_with_one_clear_message() {
         ("period NaN", vec!["inspect", "no_clock.csv", "--period-s", "nan"], "period is NaN s"),
         ("missing input", vec!["inspect", "rec.csv", "--input", "x_V"], "`x_V`"),
         ("missing output", vec!["decimate", "rec.csv", "--input", "u_V", "--output", "x_V"], "`x_V`"),
-        ("constant output", vec!["decimate", "rec.csv", "--input", "u_V", "--output", "flat_V"], "constant"),
+        (
+            "constant output",
+            vec!["decimate", "folder/in.csv", "--input", "u_V", "--output", "flat_V"],
+            "folder/in.csv, column `flat_V`: the column is constant",
+        ),
         ("input is output", vec!["decimate", "rec.csv", "--input", "y_mm", "--output", "y_mm"], "y_mm"),
         ("alpha 2", vec!["decimate", "rec.csv", "--output", "y_mm", "--alpha", "2"], "alpha"),
         (
@@ -195,8 +200,8 @@ fn each_bad_request_ends_with_one_clear_message() {
         ),
         (
             "fit: constant output",
-            vec!["fit", "--recording", "rec.csv", "--input", "u_V", "--output", "flat_V", "--out", "out"],
-            "constant",
+            vec!["fit", "--recording", "folder/in.csv", "--input", "u_V", "--output", "flat_V", "--out", "out"],
+            "folder/in.csv, column `flat_V`: the column is constant",
         ),
         (
             "fit: input is output",

@@ -22,12 +22,17 @@ y_mm = "x"
 
 /// A first-order lag under a multisine, in a recording with this sampling period and what `change` makes of each output.
 fn recording(rows: usize, period: f64, change: impl Fn(usize, f64, f64) -> f64) -> String {
+    later(0, rows, period, change)
+}
+
+/// The same from another sample of the multisine on.
+fn later(first: usize, rows: usize, period: f64, change: impl Fn(usize, f64, f64) -> f64) -> String {
     let mut text = String::from("t_s,u_V,y_mm\n");
     let mut y = 0.0;
     for n in 0..rows {
-        let t = n as f64;
+        let t = (first + n) as f64;
         let u = (0.37 * t).sin() + 0.7 * (0.11 * t + 0.5).cos() + 0.5 * (0.83 * t).sin();
-        let time = format!("{:.9}", period * t);
+        let time = format!("{:.9}", period * n as f64);
         _ = writeln!(text, "{time},{u:e},{:e}", change(n, u, y));
         y += 0.1 * (u - y);
     }
@@ -38,8 +43,8 @@ fn files() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
     write("est.csv", &recording(400, 0.01, |_, _, y| y));
-    write("val.csv", &recording(300, 0.01, |_, _, y| y));
-    write("slow.csv", &recording(300, 0.010_01, |_, _, y| y));
+    write("val.csv", &later(1000, 300, 0.01, |_, _, y| y));
+    write("slow.csv", &later(1000, 300, 0.010_01, |_, _, y| y));
     write("a.sim.toml", SIMULATION);
     write("period.sim.toml", &SIMULATION.replace("column = \"t_s\"", "period_s = 0.02"));
     dir
@@ -84,6 +89,17 @@ fn a_hold_out_is_not_what_was_learnt_from() {
     let with = |more: &[&'static str]| [&FIT[..], more].concat();
     refused(dir, &with(&["--holdout", "copy.csv"]), &["copy.csv", "the same data as est.csv"]);
     refused(dir, &with(&["--holdout", "./est.csv"]), &["est.csv", "--recording and as --holdout"]);
+    // A part, with a clock of its own.
+    let whole = std::fs::read_to_string(dir.join("est.csv")).unwrap();
+    let lines: Vec<&str> = whole.lines().collect();
+    let rows = lines[100..300].iter().enumerate().map(|(n, l)| format!("{},{}\n", n, l.split_once(',').unwrap().1));
+    std::fs::write(dir.join("part.csv"), "t_s,u_V,y_mm\n".to_owned() + &rows.collect::<String>()).unwrap();
+    let part = ["part.csv: 200 of its 200 rows stand in est.csv, too", "never sees"];
+    refused(dir, &with(&["--holdout", "part.csv"]), &part);
+    let diagnose = ["diagnose", "a.sim.toml", "--recording", "est.csv", "--holdout", "part.csv", "--out", "out"];
+    refused(dir, &diagnose, &part);
+    std::fs::write(dir.join("two.csv"), "t_s,u_V,y_mm\n0,1,2\n1,2,3\n").unwrap();
+    refused(dir, &with(&["--holdout", "two.csv"]), &["two.csv: 2 samples; at least 20 are needed"]);
     refused(dir, &with(&["--recording", "est.csv"]), &["est.csv", "given twice as --recording"]);
     refused(dir, &with(&["--input", "t_s"]), &["--input t_s", "time column"]);
     refused(dir, &with(&["--threads", "1025"]), &["--threads is 1025; allowed is 1 to 1024"]);
@@ -137,6 +153,31 @@ fn messages_name_the_remedy() {
 
 fn rows_with_a_constant_input() -> String {
     (0..100).map(|n| format!("{:.2},1.5,{}\n", 0.01 * f64::from(n), (0.3 * f64::from(n)).sin())).collect()
+}
+
+#[test]
+fn recordings_of_one_name_are_told_apart() {
+    let files = files();
+    let dir = files.path();
+    for (folder, from) in [("a", "est.csv"), ("b", "val.csv")] {
+        std::fs::create_dir(dir.join(folder)).unwrap();
+        std::fs::copy(dir.join(from), dir.join(folder).join("r.csv")).unwrap();
+    }
+    let fit = ["fit", "--recording", "a/r.csv", "--holdout", "b/r.csv", "--input", "u_V", "--output", "y_mm"];
+    let more = ["--out", "out", "--factors", "polynomial", "--degree", "1", "--json"];
+    let (status, told, said) = hysid(&[&fit[..], &more].concat(), dir);
+    assert_eq!(status, 0, "{said}");
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(
+        (&told["free_run"][0]["recording"], &told["free_run"][1]["recording"]),
+        (&"a/r.csv".into(), &"b/r.csv".into())
+    );
+    let constant = later(0, 300, 0.01, |_, _, _| 0.5);
+    std::fs::write(dir.join("b/r.csv"), constant).unwrap();
+    let diagnose = ["diagnose", "a.sim.toml", "--recording", "a/r.csv", "--holdout", "b/r.csv", "--out", "out"];
+    let (status, _, said) = hysid(&diagnose, dir);
+    assert!(status == 2 && said.contains("hysid: b/r.csv: column `y_mm` is constant"), "{said}");
+    refused(dir, &[&fit[..], &["--out", "out"]].concat(), &["b/r.csv, column `y_mm`", "constant"]);
 }
 
 /// Each once ran for ever in the iteration for the poles of its linear model.

@@ -13,8 +13,7 @@ use hysid_narx::NarxModel;
 use hysid_plant::Simulation;
 use hysid_signal::{Channel, Clock, Recording};
 
-use super::intake::Intake;
-use crate::commands::files::SAME_PERIOD;
+use crate::commands::files::{Intake, SAME_PERIOD};
 
 /// A model whose run through whole recordings is worse than this many times the error it had on pieces is not sound.
 const SOUND: f64 = 3.0;

@@ -3,21 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use hysid_diagnose::DiagnoseError;
 use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_plant::{ClockSource, Simulation};
 use hysid_signal::Recording;
 
-use crate::commands::files::{no_file_twice, no_samples_twice, same_clock_as_simulation};
+use crate::commands::files::{Intake, no_file_twice, same_clock_as_simulation};
 use crate::failure::Failure;
-
-/// Estimation and hold-out recordings.
-#[derive(Debug)]
-pub struct Intake {
-    /// To estimate from.
-    pub estimation: Vec<Recording>,
-    /// To score on only.
-    pub holdout: Vec<Recording>,
-}
 
 /// The files of a diagnosis, as the user named them.
 #[derive(Debug, Clone, Copy)]
@@ -52,23 +44,32 @@ impl Files<'_> {
     /// These columns, with the time in `t_s`.
     ///
     /// # Errors
-    /// As of [`Files::of_simulation`], and a column that is named twice.
+    /// As of [`Files::of_simulation`].
     pub fn of_columns(&self, columns: &[String]) -> Result<Intake, Failure> {
-        if let Some(twice) = columns.iter().enumerate().find(|(i, c)| columns[..*i].contains(c)) {
-            return Err(Failure::BadInput(format!(
-                "column `{}` is given twice: --simulated, --output and every --input must be different columns",
-                twice.1
-            )));
-        }
         self.read(&ReadOptions { columns: Some(columns.to_vec()), ..ReadOptions::default() })
+    }
+
+    /// The error with the path of the recording that it tells of, in the place of its name.
+    pub fn named_in(&self, mut error: DiagnoseError, intake: &Intake) -> DiagnoseError {
+        use DiagnoseError as E;
+        if let E::MissingColumn { recording, .. }
+        | E::TooFewSamples { recording, .. }
+        | E::TooManyGaps { recording, .. }
+        | E::ConstantOutput { recording, .. }
+        | E::NothingDrives { recording, .. }
+        | E::Explodes { recording, .. }
+        | E::SameData(recording) = &mut error
+            && let Some(path) = intake.path(recording, self.estimation, self.holdout)
+        {
+            *recording = path.display().to_string();
+        }
+        error
     }
 
     fn read(&self, options: &ReadOptions) -> Result<Intake, Failure> {
         no_file_twice(self.estimation, self.holdout)?;
         let all = |files: &[PathBuf]| files.iter().map(|f| read(f, options)).collect::<Result<Vec<_>, _>>();
-        let intake = Intake { estimation: all(self.estimation)?, holdout: all(self.holdout)? };
-        no_samples_twice((self.estimation, &intake.estimation), (self.holdout, &intake.holdout))?;
-        Ok(intake)
+        Intake::new((self.estimation, all(self.estimation)?), (self.holdout, all(self.holdout)?))
     }
 }
 

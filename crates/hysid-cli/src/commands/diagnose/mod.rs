@@ -11,8 +11,8 @@ use hysid_diagnose::file::VerdictKind;
 use hysid_diagnose::{DiagnoseError, Diagnosis, Hooks, Options, Question, Request, diagnose, stand_in};
 use hysid_plant::Simulation;
 
-use self::intake::{Files, Intake};
-use super::files::keep_inputs;
+use self::intake::Files;
+use super::files::{Intake, different_signals, keep_inputs};
 use super::folder::Folder;
 use super::simulation_file;
 use super::threads::pool;
@@ -99,17 +99,20 @@ fn work(args: &Args) -> Result<(), Failure> {
             let (simulation, name) = simulation_file::read(file)?;
             let intake = files.of_simulation(&simulation)?;
             let folder = Folder::claim(&args.out, &NAMES)?;
-            (answer(&simulation, &name, &intake, &questions, options, &watch)?, folder)
+            (answer(&simulation, &name, (&files, &intake), &questions, options, &watch)?, folder)
         }
         (None, Some(column)) => {
             let output = args.output.clone().unwrap_or_default();
+            let inputs = args.input.iter().map(|u| ("--input", u.as_str()));
+            let given = inputs.chain([("--output", output.as_str()), ("--simulated", column)]);
+            different_signals(&given.collect::<Vec<_>>())?;
             let columns: Vec<String> = args.input.iter().cloned().chain([output.clone(), column.clone()]).collect();
             let intake = files.of_columns(&columns)?;
             let folder = Folder::claim(&args.out, &NAMES)?;
             progress("finding a clone of the simulated column");
-            let stand_in =
-                stand_in(&args.input, &output, column, &intake.estimation, args.seed).map_err(Failure::bad_input)?;
-            let mut outcome = answer(&stand_in.simulation, column, &intake, &questions, options, &watch)?;
+            let stand_in = stand_in(&args.input, &output, column, &intake.estimation, args.seed)
+                .map_err(|e| Failure::bad_input(files.named_in(e, &intake)))?;
+            let mut outcome = answer(&stand_in.simulation, column, (&files, &intake), &questions, options, &watch)?;
             if let Some(moved) = stand_in.moved(&outcome.file.calibrated_parameters) {
                 if outcome.file.verdict == VerdictKind::NoSignificantMismatch {
                     outcome.file.summary =
@@ -177,7 +180,7 @@ enum BlackBox {
 fn answer(
     simulation: &Simulation,
     file: &str,
-    intake: &Intake,
+    (files, intake): (&Files<'_>, &Intake),
     questions: &[Question],
     options: Options,
     watch: &Watch<'_>,
@@ -200,7 +203,11 @@ fn answer(
         let hooks = Hooks { progress: watch.progress, expired: watch.expired, accepted: &beside };
         diagnose(&request, &hooks)
     });
-    let mut outcome = outcome.map_err(|e| refused(&e, &request))?;
+    let mut outcome = outcome.map_err(|e| {
+        let why = why(&e, &request);
+        let error = files.named_in(e, intake);
+        Failure::BadInput(why.map_or_else(|| error.to_string(), |why| format!("{error}: {why}")))
+    })?;
     if watch.black_box == BlackBox::LeftOut {
         return Ok(outcome);
     }
@@ -218,15 +225,9 @@ fn answer(
     Ok(outcome)
 }
 
-/// Bad input, told; of a simulation that diverges also which state does.
-fn refused(error: &DiagnoseError, request: &Request<'_>) -> Failure {
-    let why = match error {
-        DiagnoseError::Explodes { recording, .. } => request
-            .estimation
-            .iter()
-            .find(|r| r.name() == recording)
-            .and_then(|r| simulation_file::explosion(request.simulation, r)),
-        _ => None,
-    };
-    Failure::BadInput(why.map_or_else(|| error.to_string(), |why| format!("{error}: {why}")))
+/// Of a simulation that diverges, which state or output does.
+fn why(error: &DiagnoseError, request: &Request<'_>) -> Option<String> {
+    let DiagnoseError::Explodes { recording, .. } = error else { return None };
+    let found = request.estimation.iter().find(|r| r.name() == recording)?;
+    simulation_file::explosion(request.simulation, found)
 }
