@@ -33,9 +33,6 @@ enum Mode {
     Steps(usize),
 }
 
-/// Relative difference from the model's sampling period up to which a recording has the same.
-const SAME_RATE: f64 = 1e-4;
-
 /// The longest horizon that may be asked for.
 const LONGEST: usize = 1_000_000;
 
@@ -84,7 +81,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// Refuses a recording at another rate than those that the model was made from: its terms count samples, not seconds.
 fn same_rate(args: &Args, made: f64, found: f64) -> Result<(), Failure> {
-    if (found - made).abs() <= SAME_RATE * made {
+    if hysid::identify::same_rate(made, found) {
         return Ok(());
     }
     Err(Failure::BadInput(format!(

@@ -120,6 +120,11 @@ fn another_clock_is_refused() {
     refused(dir, &simulate, &["est.csv, column `t_s`", "is 0.01 s", "`period_s = 0.02`"]);
     let (status, _, said) = hysid(&[&FIT[..], &["--factors", "polynomial", "--degree", "1"]].concat(), dir);
     assert_eq!(status, 0, "{said}");
+    // As a hold-out it is told.
+    let (status, _, said) =
+        hysid(&[&FIT[..], &["--holdout", "slow.csv", "--factors", "polynomial", "--degree", "1"]].concat(), dir);
+    let warning = "warning: hold-out slow.csv: its sampling period is 0.01001 s, that of the recordings";
+    assert!(status == 0 && said.contains(warning), "{said}");
     let predict = |recording| ["predict", "out/model.json", "--recording", recording, "--out", "out.csv"];
     refused(dir, &predict("slow.csv"), &["slow.csv", "is 0.01001 s", "one of 0.01 s", "resample"]);
     assert!(!dir.join("out.csv").exists());

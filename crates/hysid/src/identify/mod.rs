@@ -32,7 +32,9 @@ mod verify;
 pub use options::{Criterion, Decimate, Factors, LARGEST_DEGREE, LARGEST_LAG, LARGEST_TERMS, Options};
 pub use path::PathPoint;
 pub use recipe::{Identified, Progress, Source, Stop, identify, identify_until};
-pub use report::{Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, NoiseLine, Role, Series, TermLine};
+pub use report::{
+    Columns, ErrorLine, FitReport, FitSummary, Horizon, Lags, NoiseLine, Role, Series, TermLine, every, same_rate,
+};
 
 use hysid_narx::NarxError;
 use hysid_signal::tell::{brief, counted, digits};

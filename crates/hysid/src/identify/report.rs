@@ -3,10 +3,25 @@
 use hysid_dictionary::Record;
 use hysid_narx::NarxModel;
 use hysid_signal::Recording;
+use hysid_signal::tell::digits;
 use hysid_validate::{Normaliser, measure};
 use serde::Serialize;
 
 use super::{Identified, IdentifyError, PathPoint};
+
+/// Relative difference from a model's sampling period up to which a recording has the same.
+const SAME_RATE: f64 = 1e-4;
+
+/// Whether a model that was made at a sampling period of `made` seconds may run on a recording with one of `found`: its terms count samples,
+/// not seconds.
+pub fn same_rate(made: f64, found: f64) -> bool {
+    (found - made).abs() <= SAME_RATE * made
+}
+
+/// How often a model that moves in steps of so many samples moves.
+pub fn every(samples: usize) -> String {
+    if samples == 1 { "every sample".to_owned() } else { format!("every {samples} samples") }
+}
 
 /// Which part a recording played.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -193,6 +208,8 @@ impl FitReport {
             });
         }
         let parts = model.parts();
+        let mut warnings = identified.warnings.clone();
+        warnings.extend(holdout.iter().zip(&free[estimation.len()..]).filter_map(|(r, line)| doubt(model, r, line)));
         let known = |x: f64| x.is_finite().then_some(x);
         let inputs = parts.signals.inputs();
         let summary = FitSummary {
@@ -235,10 +252,26 @@ impl FitReport {
             horizon: identified.horizon,
             path: identified.path.clone(),
             decisions: identified.decisions.clone(),
-            warnings: identified.warnings.clone(),
+            warnings,
             seed,
         };
         Ok(Self { summary, latex: model.latex(), series })
+    }
+}
+
+/// Why the errors on a recording that the model has never seen tell little of it.
+fn doubt(model: &NarxModel, holdout: &Recording, line: &ErrorLine) -> Option<String> {
+    let (name, found) = (holdout.name(), holdout.clock().period_s);
+    match model.parts().period_s {
+        Some(made) if !same_rate(made, found) => Some(format!(
+            "hold-out {name}: its sampling period is {} s, that of the recordings that the model was made from {} s; the model takes it sample by sample, and its errors there tell nothing",
+            digits(found, 6),
+            digits(made, 6)
+        )),
+        _ if line.samples == 0 => Some(format!(
+            "hold-out {name}: not one sample could be judged; no stretch of it is longer than the model's past"
+        )),
+        _ => None,
     }
 }
 
