@@ -122,7 +122,7 @@ fn equation(page: &mut Page, report: &FitReport) {
             sum(terms)
         ));
     }
-    page.text("As LaTeX:");
+    page.text("As LaTeX (package amsmath):");
     page.code(&report.latex);
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use hysid_signal::tell::counted;
 use hysid_signal::{Channel, correlation, power_spectrum};
 use serde_json::{Value, json};
 
@@ -169,7 +170,7 @@ impl fmt::Display for ChannelFacts {
             )?;
         }
         if self.missing > 0 {
-            writeln!(f, "  {} samples are missing", self.missing)?;
+            writeln!(f, "  {} missing", counted(self.missing, "sample"))?;
         }
         if let Some(step) = self.resolution {
             writeln!(f, "  resolution {step:.3e} ({:.0} steps over its range)", (self.largest - self.smallest) / step)?;

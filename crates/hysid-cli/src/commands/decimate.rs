@@ -150,7 +150,7 @@ fn as_text(rows: &[FactorRow], advice: &Recommendation, decimator: Decimator, al
     }
     let bound = 100.0 * (1.0 - alpha);
     text += &format!(
-        "\nMRD, MRE: equations (19) and (21) as printed (inf where the output is 0); MRD', MRE': in a form that survives y = 0.\n\
+        "\nMRD, MRE: equations (19) and (21) of Zhang, Zhu and Gu (2017) as printed there (inf where the output is 0); MRD', MRE': in a form that survives y = 0.\n\
          Admissible (MRD above {bound:.0} %, MRE below {bound:.0} %): as printed {}; in the robust form {}.\n\n\
          Recommended: L = {}. {}\n",
         list(&advice.admissible_as_printed),

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use hysid::identify::{Criterion, Decimate, Factors, FitReport, IdentifyError, Options, Source, identify};
+use hysid::identify::{Criterion, Decimate, Factors, FitReport, IdentifyError, Options, Source, every, identify};
 use hysid_io::{CsvChunks, ReadOptions, TimeSource, read_recording, require};
 use hysid_signal::Recording;
+use hysid_signal::tell::counted;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::files::{Intake, different_signals, keep_inputs, no_file_twice};
@@ -218,9 +219,9 @@ fn summary(report: &FitReport) {
         println!("  where {d}");
     }
     println!(
-        "{} terms, every {} sample(s), output lags to {}, input lags {} to {}",
-        s.terms.len(),
-        s.decimation,
+        "{}, {}, output lags to {}, input lags {} to {}",
+        counted(s.terms.len(), "term"),
+        every(s.decimation),
         s.lags.output,
         s.lags.input_delay,
         s.lags.input

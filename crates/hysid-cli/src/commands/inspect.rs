@@ -131,8 +131,13 @@ fn as_text(
     let whole = recording.segments(&names);
     if whole.len() != 1 || whole[0].len() != recording.len() {
         let longest = whole.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
-        text +=
-            &format!("Gaps: {} stretches without a missing sample, the longest of {longest} samples\n", whole.len());
+        text += &format!(
+            "Gaps: {}, counted where no channel misses a sample; the longest is of {longest} samples\n",
+            match whole.len() {
+                1 => "1 stretch".to_owned(),
+                n => format!("{n} stretches"),
+            }
+        );
     }
     for f in facts {
         text += &format!("\n{f}");

@@ -161,6 +161,28 @@ fn rows_with_a_constant_input() -> String {
 }
 
 #[test]
+fn gaps_are_told_as_what_they_are() {
+    let files = files();
+    let dir = files.path();
+    // Every second input is missing: samples enough, but never two in a row.
+    let whole = later(2000, 60, 0.01, |_, _, y| y);
+    let hole = |(n, line): (usize, &str)| {
+        let fields: Vec<&str> = line.split(',').collect();
+        if n % 2 == 0 && n > 0 { format!("{},,{}\n", fields[0], fields[2]) } else { format!("{line}\n") }
+    };
+    std::fs::write(dir.join("holes.csv"), whole.lines().enumerate().map(hole).collect::<String>()).unwrap();
+    let line = [&FIT[..], &["--holdout", "holes.csv", "--factors", "polynomial", "--degree", "1"]].concat();
+    let (status, told, said) = hysid(&line, dir);
+    assert!(status == 0 && said.contains("warning: hold-out holes.csv: not one sample could be judged"), "{said}");
+    assert!(told.contains("every sample, output lags"), "{told}");
+    let one = later(0, 60, 0.01, |n, _, y| if n == 30 { f64::NAN } else { y });
+    std::fs::write(dir.join("one.csv"), one).unwrap();
+    let (_, told, _) = hysid(&["inspect", "one.csv"], dir);
+    let gaps = "Gaps: 2 stretches, counted where no channel misses a sample; the longest is of 30 samples";
+    assert!(told.contains(gaps) && told.contains("\n  1 sample missing\n"), "{told}");
+}
+
+#[test]
 fn recordings_of_one_name_are_told_apart() {
     let files = files();
     let dir = files.path();

@@ -5,7 +5,7 @@ use hysid_dictionary::{Factor, Quantity};
 use crate::NarxModel;
 
 impl NarxModel {
-    /// The model as the body of a LaTeX `align` environment, a term to a line; coefficients with six digits.
+    /// The model as a LaTeX `align*` environment (of the package amsmath), a term to a line; coefficients with six digits.
     pub fn latex(&self) -> String {
         let output = &self.signals().output().symbol;
         let mut lines = Vec::new();
@@ -22,7 +22,8 @@ impl NarxModel {
             let product = self.product(t.term.factors());
             lines.push(format!("{sign} {}{product}\\, e[n-{}]", number(t.theta.abs()), t.lag));
         }
-        format!("{}[n] &= {}", symbol(output), lines.join(" \\\\\n&\\quad "))
+        let sum = lines.join(" \\\\\n&\\quad ");
+        format!("\\begin{{align*}}\n{}[n] &= {sum}\n\\end{{align*}}", symbol(output))
     }
 
     fn product(&self, factors: &[Factor]) -> String {

@@ -114,7 +114,8 @@ fn python_code_agrees() {
 #[test]
 fn latex_names_every_term() {
     let text = model().latex();
-    assert!(text.starts_with("y[n] &= 0.0100000 \\\\"));
+    assert!(text.starts_with("\\begin{align*}\ny[n] &= 0.0100000 \\\\"));
+    assert!(text.ends_with("\n\\end{align*}"));
     for part in ["y[n-2]^{2}\\, u[n]", "\\operatorname{sgn}(\\Delta u[n])", "w_{2}[n-1]", "\\Delta u[n-1]^{3}"] {
         assert!(text.contains(part), "{part} in {text}");
     }

@@ -12,6 +12,7 @@ use super::growth::Stage;
 use super::options::Options;
 use super::path::PathPoint;
 use super::rates::{PREFER_OWN_RATE, rates};
+use super::report::every;
 use super::verify::{horizon, warnings};
 use super::{Horizon, IdentifyError};
 
@@ -92,8 +93,10 @@ pub fn identify_until(
             Err(e) => refused = refused.or(Some(e)),
             Ok(w) => {
                 decisions.push(format!(
-                    "every {rate} sample(s): held-out free run {:.4e} by {}",
-                    w.stage.held.rmse, w.family.name
+                    "{}: held-out free run {:.4e} by {}",
+                    every(rate),
+                    w.stage.held.rmse,
+                    w.family.name
                 ));
                 let bar = found.as_ref().map_or(f64::INFINITY, |f| f.score * PREFER_OWN_RATE);
                 if w.score < bar || found.is_none() {

@@ -1,6 +1,7 @@
 //! How far the model holds, and what its user should be wary of.
 
 use hysid_narx::{Fit, Window};
+use hysid_signal::tell::counted;
 
 use super::desk::Desk;
 use super::family::Family;
@@ -89,7 +90,7 @@ pub(crate) fn warnings(
     }
     let gaps: usize = desk.samples.iter().map(|s| s.record().gap_free().len().saturating_sub(1)).sum();
     if gaps > 0 {
-        out.push(format!("the recordings have {gaps} gap(s); each gap-free stretch is used on its own"));
+        out.push(format!("the recordings have {}; each gap-free stretch is used on its own", counted(gaps, "gap")));
     }
     Ok(out)
 }
