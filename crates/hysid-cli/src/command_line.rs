@@ -69,3 +69,64 @@ fn program_of(usage: &StyledStr) -> String {
     let names = words.take_while(|w| w.starts_with(|c: char| c.is_ascii_lowercase()));
     std::iter::once("hysid").chain(names).collect::<Vec<_>>().join(" ")
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write;
+
+    use super::*;
+
+    /// The arguments of a command as a table in Markdown, from what `--help` says of them.
+    fn table(command: &Command) -> String {
+        let mut text = String::from("| option | meaning | |\n|---|---|---|\n");
+        for arg in command.get_arguments().filter(|a| !a.is_hide_set() && a.get_id() != "help") {
+            let values = arg.get_value_names().unwrap_or_default().join(" ");
+            let name = match arg.get_long() {
+                Some(long) if arg.get_action().takes_values() => format!("--{long} {values}"),
+                Some(long) => format!("--{long}"),
+                None => values,
+            };
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            let possible: Vec<String> = arg.get_possible_values().iter().map(|v| v.get_name().to_owned()).collect();
+            let choices = match possible.as_slice() {
+                [first, .., last] if first != "true" || last != "false" => format!(": {}", possible.join(", ")),
+                _ => String::new(),
+            };
+            let default: Vec<_> = arg.get_default_values().iter().map(|v| v.to_string_lossy()).collect();
+            let given = match (arg.is_required_set(), arg.get_action().takes_values(), default.as_slice()) {
+                (true, ..) => "required".to_owned(),
+                (_, true, [_, ..]) => format!("default {}", default.join(" ")),
+                _ => String::new(),
+            };
+            // A bar would end the cell.
+            let cell = |text: &str| text.replace('|', "\\|");
+            let meaning = format!("{}{choices}", help.trim_end_matches('.'));
+            writeln!(text, "| `{}` | {} | {given} |", cell(&name), cell(&meaning)).unwrap();
+        }
+        text
+    }
+
+    #[test]
+    fn the_page_of_the_commands_lists_every_option_as_help_does() {
+        let page = include_str!("../../../docs/commands.md");
+        let mut program = crate::Cli::command();
+        program.build();
+        let (mut commands, mut wrong) = (0, String::new());
+        for command in program.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help") {
+            let heading = format!("\n## `hysid {}`\n", command.get_name());
+            let section = page.split(&heading).nth(1).unwrap_or_default();
+            let section = section.split("\n## ").next().unwrap_or_default();
+            let table = table(command);
+            if !section.contains(&table) {
+                wrong += &format!("{heading}\n{table}");
+            }
+            commands += 1;
+        }
+        assert!(wrong.is_empty(), "docs/commands.md must hold:\n{wrong}");
+        assert_eq!(
+            page.matches("\n## `hysid ").count(),
+            commands,
+            "docs/commands.md holds a command that there is not"
+        );
+    }
+}

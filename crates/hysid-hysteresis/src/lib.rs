@@ -49,3 +49,8 @@ pub use preisach::{PreisachGrid, PreisachPlane, PreisachStaircase};
 pub use reduced_frequency::{ReducedFrequency, ReducedFrequencyParameters, Wing};
 pub use relay::{Relay, RelayState, relay};
 pub use stop::Stop;
+
+// The snippet of the page is run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/operators.md")]
+struct OperatorsPage;
