@@ -137,12 +137,14 @@ impl Unit {
     }
 
     /// The same unit by one of the usual names where that takes fewer factors: `N` for `m^2 Pa`, `N m` for `N m V/(A ohm)`. Units that are multiples of
-    /// others (`mm`, `bar`) stay as they are, and so does what holds an angle.
+    /// others (`mm`, `bar`) stay as they are, and so does what holds an angle, but for radians where the name takes two factors fewer: `N m` for `A V s/rad`,
+    /// and `N m/rad` as it is.
     pub fn briefly(&self) -> Self {
-        let coherent = |name: &str| COHERENT.contains(&name);
-        if self.factors.iter().all(|(name, _)| coherent(name)) {
+        let (radians, others): (Vec<&str>, Vec<&str>) =
+            self.factors.iter().map(|(n, _)| n.as_str()).partition(|n| *n == "rad");
+        if others.iter().all(|name| COHERENT.contains(name)) {
             let usual = USUAL.iter().filter_map(|text| Self::parse(text).ok());
-            let mut shorter = usual.filter(|u| u.factors.len() < self.factors.len());
+            let mut shorter = usual.filter(|u| u.factors.len() + radians.len() < self.factors.len());
             if let Some(unit) = shorter.find(|u| u.same_dimension(self)) {
                 return unit;
             }

@@ -74,7 +74,7 @@ pub struct Intake {
 }
 
 /// Share of a hold-out's rows from which it is not what the estimation never sees.
-const MOST_IN_COMMON: f64 = 0.1;
+const MOST_IN_COMMON: f64 = 0.5;
 
 impl Intake {
     /// Recordings with the files that they were read from. Two that would have the same name (that of the file without its folders) are named by

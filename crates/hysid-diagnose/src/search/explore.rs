@@ -18,6 +18,7 @@ use crate::file::DetectableRecord;
 use crate::model::base::{Base, NoiseKind};
 use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::request::{Hooks, Request, words};
+use crate::text::number;
 
 /// What was found on one calibration.
 pub struct Explored<'a, 'd> {
@@ -194,8 +195,8 @@ pub fn explore<'a, 'd>(
         };
         if let Some(p) = seen.or_else(|| search.by_terms(&none)) {
             notes.push(format!(
-                "surrogates of the residual do not tell the mismatch from noise (p = {:.3}); effects that were fitted to it do (p = {p:.1e})",
-                test.p_value
+                "surrogates of the residual do not tell the mismatch from noise (p = {}); effects that were fitted to it do (p = {p:.1e})",
+                number(test.p_value)
             ));
             p_value = p.min(p_value);
             significant = true;

@@ -9,6 +9,17 @@ use super::motion::{Motion, force_of};
 use super::sensed::{Felt, Sensed};
 use super::{Pull, Slot, Target};
 
+/// Whether a sum of products is told with a minus, and its size; `None` where some of them are and others not.
+fn one_way(sum: &Expr) -> Option<(bool, Expr)> {
+    let sized = |(sign, term): (f64, &Expr)| {
+        let (negative, size) = signed(term.clone());
+        (negative != (sign < 0.0), size)
+    };
+    let (negative, sizes): (Vec<bool>, Vec<Expr>) = sum.terms().into_iter().map(sized).unzip();
+    let whole = sizes.into_iter().reduce(|a, b| a + b)?;
+    negative.iter().all(|n| *n == negative[0]).then_some((negative[0], whole))
+}
+
 impl Finder<'_> {
     /// Connections of a simulation in relative coordinates, as the drifts of storeys: what the deflection of an element pulls with stands in the
     /// equations of several coordinates, in a term of that deflection alone.
@@ -44,10 +55,8 @@ impl Finder<'_> {
             let unit = units.into_iter().chain(&own).rev().max_by_key(told_by)?.clone();
             let share = |springs: &[Expr]| {
                 let shares: Option<Vec<Expr>> = springs.iter().map(|spring| of(&unit, spring)).collect();
-                let (negative, shares): (Vec<bool>, Vec<Expr>) = shares?.into_iter().map(signed).unzip();
-                let one_way = negative.iter().all(|n| *n == negative[0]);
-                let whole = shares.into_iter().reduce(|a, b| a + b)?;
-                one_way.then(|| (if negative[0] { -1.0 } else { 1.0 }, unless_one(whole)))
+                let (negative, whole) = one_way(&shares?.into_iter().reduce(|a, b| a + b)?)?;
+                Some((if negative { -1.0 } else { 1.0 }, unless_one(whole)))
             };
             // Another spring may be at the same coordinate: the tyre under a suspension.
             let own: Vec<Expr> = own.iter().filter(|spring| of(&unit, spring).is_some()).cloned().collect();
@@ -69,7 +78,12 @@ impl Finder<'_> {
             slot.offer(self.simulation, "k", (-unit).simplified());
             Some(slot)
         };
-        self.motions.iter().filter_map(|one| element(one).or_else(|| self.element_of_a_parameter(one))).collect()
+        // What sensors feel of it is told by the stiffness alone.
+        let either = |one: &Motion<'_>| match self.element_of_a_parameter(one) {
+            Some(slot) if !slot.sensed.is_empty() => Some(slot),
+            other => element(one).or(other),
+        };
+        self.motions.iter().filter_map(either).collect()
     }
 
     /// An element by its stiffness, a parameter that multiplies nothing but the deflection of a part, wherever it stands: what pulls at the coordinates, and what
@@ -79,23 +93,24 @@ impl Finder<'_> {
         let stiffness = |name: &str| {
             let (pulled, mass) = force_of(self.simulation, one.derivative);
             let own = self.multiple_of(pulled, name, x)?;
-            let above = |multiple: Expr, mass: Option<&Expr>| match mass {
-                Some(mass) => (mass.clone() * multiple).simplified(),
-                None => multiple,
+            // Of what is above the line of a quotient by a mass.
+            let above = |multiple: Expr, mass: Option<&Expr>| {
+                let (negative, size) = one_way(&multiple)?;
+                Some((negative, mass.map_or(size.clone(), |mass| (mass.clone() * size).simplified())))
             };
-            let (true, lever) = signed(above(own, mass)) else { return None };
+            let (true, lever) = above(own, mass)? else { return None };
             let mut pulls = vec![Pull { lever: unless_one(lever.clone()), ..Pull::new(one.state, 1.0) }];
             let mut felt = Vec::new();
             for other in self.motions.iter().filter(|m| m.v != one.v && m.derivative.uses(name)) {
                 let (pulled, mass) = force_of(self.simulation, other.derivative);
-                let (negative, lever) = signed(above(self.multiple_of(pulled, name, x)?, mass));
+                let (negative, lever) = above(self.multiple_of(pulled, name, x)?, mass)?;
                 let sign = if negative { 1.0 } else { -1.0 };
                 pulls.push(Pull { lever: unless_one(lever), ..Pull::new(other.state, sign) });
                 felt.push(other);
             }
             let mut sensed = Vec::new();
             for output in self.simulation.outputs.iter().filter(|o| o.expression.uses(name)) {
-                let (negative, share) = signed(self.multiple_of(&output.expression, name, x)?);
+                let (negative, share) = one_way(&self.multiple_of(&output.expression, name, x)?)?;
                 let (state, column) = (one.state.to_owned(), output.column.clone());
                 let times = if negative { 1.0 } else { -1.0 };
                 sensed.push(Sensed { felt: Felt::Share(share), state, column, times });
@@ -205,11 +220,16 @@ mod tests {
 
     #[test]
     fn a_spring_pulls_and_is_felt_wherever_its_stiffness_stands() {
-        let equations = [
-            "-ag - (k1*d1 + c1*v1 - k2*d2 - c2*v2)/m1",
+        for second in [
             "(k1*d1 + c1*v1)/m1 - (k2*d2 + c2*v2)*(1/m1 + 1/m2)",
-            "-(k2*d2 + c2*v2)/m2",
-        ];
+            "(k1*d1 + c1*v1)/m1 - (k2*d2 + c2*v2)/m1 - (k2*d2 + c2*v2)/m2",
+        ] {
+            is_felt(["-ag - (k1*d1 + c1*v1 - k2*d2 - c2*v2)/m1", second, "-(k2*d2 + c2*v2)/m2"]);
+        }
+    }
+
+    /// Holds what is written at each spring against what would have stood there.
+    fn is_felt(equations: [&str; 3]) {
         let plain = frame(equations, &[]);
         let slots: Vec<Slot> =
             Structure::of(&plain).slots.into_iter().filter(|s| s.place == Place::Connection).collect();

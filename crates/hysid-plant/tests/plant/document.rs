@@ -96,6 +96,8 @@ fn units_multiply_and_compare() {
         ("V s", "V s"),
         ("N s/m", "N s/m"),
         ("N m/rad", "N m/rad"),
+        ("N m s/rad", "N m s/rad"),
+        ("V s A/rad", "N m"),
         ("m^2 bar", "m^2 bar"),
         ("mm^2 Pa", "mm^2 Pa"),
     ] {

@@ -197,7 +197,8 @@ fn draw_at(numbers: Range<usize>, some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync)
 
 /// Scores of surrogates, in batches until the answer is clear.
 fn draw(some: &(dyn Fn(Range<u64>) -> Vec<f64> + Sync), statistic: f64, alpha: f64) -> Vec<f64> {
-    let alpha = alpha.clamp(1e-5, 0.5);
+    // At a level below this the surrogates would take longer than all else; the second look has a bound for it.
+    let alpha = alpha.clamp(1e-4, 0.5);
     let first = ((1.0 / alpha).ceil() as usize).max(200) - 1;
     let most = ((4.0 / alpha).ceil() as usize).max(1000) - 1;
     let mut scores: Vec<f64> = Vec::new();
