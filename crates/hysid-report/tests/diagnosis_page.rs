@@ -118,3 +118,14 @@ fn every_verdict_has_its_headline() {
         assert_eq!(html.contains("19.8 to 20.9"), verdict != VerdictKind::NoSignificantMismatch);
     }
 }
+
+#[test]
+fn a_simulation_that_follows_nothing_is_told_so() {
+    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
+    let mut lost = picture();
+    lost.records[0].role = Role::Estimation;
+    lost.records[0].before = vec![0.5; 3];
+    let of = |picture: &Picture| page(&file(VerdictKind::NoSignificantMismatch), picture, &provenance);
+    assert!(of(&lost).contains("does not follow the recording") && of(&lost).contains("Do not keep this simulation"));
+    assert!(!of(&picture()).contains("does not follow the recording"));
+}

@@ -80,7 +80,12 @@ pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<Alterna
                 family: e.mechanism.family.name().into(),
                 slot: e.slot.label.clone(),
                 probability: total.min(1.0),
-                evidence_gap: 2.0 * (weighed[winner].log_evidence - weighed[i].log_evidence),
+                // An effect that is told stands in the set that is told.
+                evidence_gap: if winning {
+                    0.0
+                } else {
+                    2.0 * (weighed[winner].log_evidence - weighed[i].log_evidence)
+                },
                 separation: None,
             });
         }

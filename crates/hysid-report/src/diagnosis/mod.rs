@@ -22,8 +22,11 @@ const MOST_RIVALS: usize = 12;
 
 /// The page as HTML text.
 pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) -> String {
-    let mut page =
-        Page::new(format!("Diagnosis: {}", picture.title), words::headline(file), words::told(&file.summary, file));
+    let mut page = Page::new(
+        format!("Diagnosis: {}", picture.title),
+        words::headline(file, picture),
+        words::told(&file.summary, file),
+    );
     merit(&mut page, file);
     effects(&mut page, file);
     next(&mut page, file, picture);

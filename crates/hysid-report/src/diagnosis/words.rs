@@ -9,10 +9,13 @@ pub(super) fn plain(identifier: &str) -> String {
 }
 
 /// The verdict as a headline.
-pub(super) fn headline(file: &DiagnosisFile) -> String {
+pub(super) fn headline(file: &DiagnosisFile, picture: &Picture) -> String {
     let mechanisms: Vec<String> = file.effects.iter().map(|e| plain(&e.mechanism)).collect();
     let families: Vec<String> = file.effects.iter().map(|e| plain(&e.family)).collect();
     match file.verdict {
+        VerdictKind::NoSignificantMismatch if !picture.unexplained().is_empty() => {
+            "The simulation does not follow the recording, and nothing tells what is missing".into()
+        }
         VerdictKind::NoSignificantMismatch => "No significant mismatch".into(),
         VerdictKind::Named => format!("Missing: {}", mechanisms.join(" and ")),
         VerdictKind::Family => format!("Missing: something of the family {}", families.join(" and ")),
