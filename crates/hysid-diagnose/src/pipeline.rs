@@ -200,6 +200,8 @@ fn statement(
     let Explored { search, pool, candidates, significant, p_value, residual, detectable, .. } = found;
     let (setting, simulation, seed) = (&search.setting, request.simulation, request.options.seed);
     let best = &pool[judged.winner];
+    let unsupported = *significant && judged.kind == VerdictKind::NoSignificantMismatch;
+    let significant = &(*significant && !unsupported);
     let residual_rms = by_column(simulation, residual);
     let noise: Vec<f64> = best.base.whitener.models.iter().map(NoiseModel::noise_rms).collect();
     let noise_rms = if *significant { by_column(simulation, &noise) } else { residual_rms.clone() };
@@ -245,6 +247,12 @@ fn statement(
     }
     if judged.rest.pushed {
         file.notes.push("predicted from sample to sample, the simulation with these effects follows the recording far better than anything does that could be fitted to what its free run leaves: random forces that act on the machine explain that".into());
+    }
+    if unsupported {
+        file.notes.push(format!(
+            "surrogates of the residual hardly come by what is left (p = {}), but no effect and no generic term outweighs what its parameters cost: it is taken for noise",
+            number(*p_value)
+        ));
     }
     if judged.unexplained() {
         file.notes.push("simulation and recording differ by more than noise does, but no effect and no generic term outweighs what its parameters cost: what is told is the likeliest, and no augmented simulation is written".into());

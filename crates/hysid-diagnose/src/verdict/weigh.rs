@@ -165,13 +165,10 @@ pub fn bounded(base: &Base<'_>, effect: &Effect) -> bool {
 /// Whether an amplitude of the effect stands at a bound other than nothing: the law is stretched to what it was not made for, something else may be meant. One
 /// of several that is nothing (a friction that a load makes, without a constant part) stretches nothing.
 pub fn stretched(base: &Base<'_>, effect: &Effect) -> bool {
-    let (mut far, mut there) = (false, false);
-    for place in effect.written.amplitudes.iter().filter_map(|a| base.model.place_of(&a.name)) {
-        let nothing = base.fit.theta[place] == 0.0;
-        far |= base.fit.at_bound[place] && !nothing;
-        there |= !nothing;
-    }
-    far || (!there && !effect.written.amplitudes.is_empty())
+    let places: Vec<usize> = effect.written.amplitudes.iter().filter_map(|a| base.model.place_of(&a.name)).collect();
+    let nothing = |place: &usize| base.fit.theta[*place] == 0.0;
+    let far = places.iter().any(|place| base.fit.at_bound[*place] && !nothing(place));
+    far || (!places.is_empty() && places.iter().all(nothing))
 }
 
 /// Whether an effect that the clock drives is as strong as its law allows: a parameter that jumps to four times its value, a disturbance beyond all forces.
