@@ -25,14 +25,36 @@ pub fn channel<'a>(file: &Path, recording: &'a Recording, name: &str) -> Result<
 /// As [`channel`]; [`InputProblem::AllMissing`]; [`InputProblem::Constant`].
 pub fn varying<'a>(file: &Path, recording: &'a Recording, name: &str) -> Result<&'a Channel, InputError> {
     let found = channel(file, recording, name)?;
-    let mut present = found.samples.iter().copied().filter(|x| x.is_finite());
-    let Some(first) = present.next() else {
-        return Err(InputError::in_column(file, name, InputProblem::AllMissing));
-    };
-    if present.all(|x| x == first) {
-        return Err(InputError::in_column(file, name, InputProblem::Constant(first)));
+    let mut values = Values::default();
+    values.see(&found.samples);
+    match values.problem() {
+        Some(problem) => Err(InputError::in_column(file, name, problem)),
+        None => Ok(found),
     }
-    Ok(found)
+}
+
+/// Whether a column takes more than one value, told of it in as many parts as it comes in.
+#[derive(Debug, Default)]
+pub struct Values {
+    first: Option<f64>,
+    vary: bool,
+}
+
+impl Values {
+    /// Takes more of the column in; what is not finite is missing.
+    pub fn see(&mut self, samples: &[f64]) {
+        for &x in samples.iter().filter(|x| x.is_finite()) {
+            self.vary |= *self.first.get_or_insert(x) != x;
+        }
+    }
+
+    /// What is wrong with the column that was seen: no value at all, or one only.
+    pub fn problem(&self) -> Option<InputProblem> {
+        match self.first {
+            None => Some(InputProblem::AllMissing),
+            Some(value) => (!self.vary).then_some(InputProblem::Constant(value)),
+        }
+    }
 }
 
 /// The number of samples at which none of the named channels is missing, which must be at least `needed`.

@@ -4,6 +4,8 @@
 //! from 1e-15 to 1e6, is a constant. What has jumps or memory tells nothing by a derivative of 0 (`step(x - 1)`); it is taken for a quantity
 //! of its own, the same wherever it is written the same.
 
+use hysid_signal::mixed;
+
 use crate::expr::{BinaryOp, Expr, Function};
 use crate::number::{Lanes, Number};
 
@@ -82,14 +84,6 @@ impl At<'_> {
         let value = if uniform() < 0.5 { -size } else { size };
         Lanes::lift(value).add_tangent(0, 0.5 + uniform())
     }
-}
-
-/// The next number of a sequence without a pattern (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
-fn mixed(state: u64) -> u64 {
-    let mut z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Whether two recordings hold the same stretch of samples, as a part that was cut out of a recording does.
 
-use crate::Recording;
+use crate::{Recording, mixed};
 
 /// Rows, each unlike the one before it, that two recordings must have in common without a break for these to be the same samples. A machine
 /// at rest gives the same few rows again and again; with noise on it, not two in a row.
@@ -39,7 +39,7 @@ fn levels(order: &Recording, of: &Recording) -> Option<Vec<Level>> {
     }
     let mut levels: Vec<Level> = Vec::new();
     for n in 0..of.len() {
-        let hash = channels.iter().fold(0, |hash, samples| mixed(hash, samples[n].to_bits()));
+        let hash = channels.iter().fold(0, |hash, samples| taking(hash, samples[n].to_bits()));
         match levels.last_mut() {
             Some(last) if last.hash == hash => last.rows += 1,
             _ => levels.push(Level { hash, rows: 1 }),
@@ -49,15 +49,12 @@ fn levels(order: &Recording, of: &Recording) -> Option<Vec<Level>> {
 }
 
 fn stretch(window: &[Level]) -> u64 {
-    window.iter().fold(0, |hash, level| mixed(mixed(hash, level.hash), level.rows as u64))
+    window.iter().fold(0, |hash, level| taking(taking(hash, level.hash), level.rows as u64))
 }
 
-/// A hash that takes one more number in: that of Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
-fn mixed(hash: u64, value: u64) -> u64 {
-    let mut z = hash.rotate_left(23).wrapping_add(value).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+/// A hash that takes one more number in.
+fn taking(hash: u64, value: u64) -> u64 {
+    mixed(hash.rotate_left(23).wrapping_add(value))
 }
 
 #[cfg(test)]

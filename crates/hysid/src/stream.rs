@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use hysid_dictionary::{Dictionary, DictionaryError, GramSums, Record};
-use hysid_io::{Chunk, ClockWatch, CsvStream, InputError, InputProblem};
+use hysid_io::{Chunk, ClockWatch, CsvStream, InputError, InputProblem, require};
 use hysid_select::{Options, SelectError, Selection, select_gram};
 
 /// What a selection from a file found.
@@ -71,7 +71,7 @@ pub fn select_file(
         .chain(time)
         .collect();
     let mut clock = ClockWatch::new();
-    let mut output = Values::default();
+    let mut output = require::Values::default();
     let (rows, bytes) = for_each_chunk(file, &columns, progress, |chunk, stream| {
         if let (Some(name), Some(t)) = (time, chunk.columns.get(columns.len() - 1)) {
             clock.judge(t, stream.decimals(columns.len() - 1)).map_err(|(n, problem)| match chunk.lines.get(n) {
@@ -94,28 +94,6 @@ pub fn select_file(
     }
     let selection = select_gram(&gram, options).map_err(|e| unfit(e.to_string()))?;
     Ok(Streamed { selection, rows, bytes, period_s: clock.period_s(), distinct_sums })
-}
-
-/// Whether a column takes more than one value.
-#[derive(Debug, Default)]
-struct Values {
-    first: Option<f64>,
-    vary: bool,
-}
-
-impl Values {
-    fn see(&mut self, samples: &[f64]) {
-        for &x in samples.iter().filter(|x| x.is_finite()) {
-            self.vary |= *self.first.get_or_insert(x) != x;
-        }
-    }
-
-    fn problem(&self) -> Option<InputProblem> {
-        match self.first {
-            None => Some(InputProblem::AllMissing),
-            Some(value) => (!self.vary).then_some(InputProblem::Constant(value)),
-        }
-    }
 }
 
 /// Reads a file to its end, chunk by chunk; returns its rows and bytes.

@@ -88,13 +88,14 @@ impl Intake {
     ) -> Result<Self, Failure> {
         for (file, h) in holdout.0.iter().zip(&holdout.1) {
             for (learnt, e) in estimation.0.iter().zip(&estimation.1) {
-                let same = rows_in_both(h, e);
                 let what = if e.same_samples(h) {
                     format!("it holds the same data as {}, which", learnt.display())
-                } else if same as f64 >= MOST_IN_COMMON * h.len() as f64 && same > 0 {
-                    format!("{same} of its {} rows stand in {}, too, which", h.len(), learnt.display())
                 } else {
-                    continue;
+                    let same = rows_in_both(h, e);
+                    if same == 0 || (same as f64) < MOST_IN_COMMON * h.len() as f64 {
+                        continue;
+                    }
+                    format!("{same} of its {} rows stand in {}, too, which", h.len(), learnt.display())
                 };
                 return Err(Failure::BadInput(format!(
                     "{}: {what} is a --recording; the hold-out must be data that the estimation never sees",

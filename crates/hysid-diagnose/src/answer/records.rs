@@ -63,11 +63,9 @@ pub fn alternatives(contest: &Contest<'_, '_>, kind: VerdictKind) -> Vec<Alterna
     for i in order {
         for e in &pool[i].effects {
             let winning = pool[winner].effects.iter().any(|w| w.states_the_same(e));
-            if says_more[i] && !winning {
-                continue;
-            }
             let listed = out.iter().any(|a| a.mechanism == e.mechanism.id && a.slot == e.slot.label);
-            if listed || (winning && kind != VerdictKind::Ambiguous) {
+            let left_out = if winning { kind != VerdictKind::Ambiguous } else { says_more[i] };
+            if listed || left_out {
                 continue;
             }
             let total: f64 = (weighed.iter().zip(probability).zip(&says_more))

@@ -15,7 +15,7 @@ use crate::mechanism::{Family, Mechanism, Purpose, Rewritten, Signals, catalogue
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Key};
 use crate::model::{Model, Values, along};
-use crate::slot::{Slot, Structure};
+use crate::slot::{Slot, Structure, only_parameters};
 
 /// Points of a candidate, the best, whose columns are kept for pairs beside those of the mismatch test.
 pub const JOINT: usize = 2;
@@ -107,7 +107,6 @@ fn signals(
 ) -> Vec<Option<Signals>> {
     let data = base.model.data();
     let simulation = base.model.simulation();
-    let constant = |e: &Expr| e.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some());
     let mut expressions: Vec<Expr> = Vec::new();
     let mut place = BTreeMap::new();
     for slot in &structure.slots {
@@ -138,7 +137,7 @@ fn signals(
             let mut constants = BTreeMap::new();
             for (symbol, quantity) in slot.symbols() {
                 let all: Vec<f64> = series.get(*place.get(&quantity.expression.to_string())?)?.concat();
-                if constant(&quantity.expression) {
+                if only_parameters(simulation, &quantity.expression) {
                     constants.insert(symbol.to_owned(), *all.first()?);
                 } else {
                     moving.insert(symbol.to_owned(), all);

@@ -125,9 +125,14 @@ pub(crate) fn quotient(above: Expr, below: Expr) -> Expr {
     if positive { found } else { -found }
 }
 
+/// The symbols that are no parameters (nor `pi`), in order.
+pub(super) fn signals_in(simulation: &Simulation, expr: &Expr) -> impl Iterator<Item = String> {
+    expr.symbols().into_iter().filter(|s| s != "pi" && simulation.parameter(s).is_none())
+}
+
 /// Whether every symbol is a parameter (or `pi`).
 pub(crate) fn only_parameters(simulation: &Simulation, expr: &Expr) -> bool {
-    expr.symbols().iter().all(|s| s == "pi" || simulation.parameter(s).is_some())
+    signals_in(simulation, expr).next().is_none()
 }
 
 /// An expression for the size of a sum: the sum of the absolute values of its terms, also where the sum as a whole is multiplied or divided by

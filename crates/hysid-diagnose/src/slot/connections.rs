@@ -2,7 +2,9 @@
 
 use hysid_plant::{BinaryOp, Expr, Simulation, State};
 
-use super::algebra::{coefficient, constant_coefficient, linear_coefficient, only_parameters, quotient, unless_one};
+use super::algebra::{
+    coefficient, constant_coefficient, linear_coefficient, only_parameters, quotient, signals_in, unless_one,
+};
 use super::find::Finder;
 use super::motion::{Motion, angle, force_of};
 use super::turn::is_rate_of_turn;
@@ -110,8 +112,7 @@ impl Finder<'_> {
             let (Some(one), Some(other), None) = (between.next(), between.next(), between.next()) else {
                 return self.twist_to_ground(state);
             };
-            let only = |s: &String| s == one.v || s == other.v || s == "pi" || self.simulation.parameter(s).is_some();
-            if !rate.symbols().iter().all(only) {
+            if signals_in(self.simulation, rate).any(|s| s != one.v && s != other.v) {
                 return None;
             }
             let coefficients = [one, other].map(|m| constant_coefficient(self.simulation, rate, m.v));

@@ -2,7 +2,7 @@
 
 use hysid_plant::{BinaryOp, Expr};
 
-use super::algebra::{coefficient, linear_coefficient, only_parameters, quotient, unless_one};
+use super::algebra::{coefficient, linear_coefficient, only_parameters, quotient, signals_in, unless_one};
 use super::connections::{Stretch, forces_of, signed};
 use super::find::Finder;
 use super::motion::{Motion, force_of};
@@ -134,8 +134,7 @@ impl Finder<'_> {
     fn multiple_of(&self, e: &Expr, parameter: &str, x: &str) -> Option<Expr> {
         let multiplied = coefficient(e, parameter)?;
         let multiple = coefficient(&multiplied, x)?.simplified();
-        let known = |s: &String| s == x || s == "pi" || self.simulation.parameter(s).is_some();
-        let alone = multiplied.symbols().iter().all(known);
+        let alone = signals_in(self.simulation, &multiplied).all(|s| s == x);
         (alone && only_parameters(self.simulation, &multiple)).then_some(multiple)
     }
 

@@ -248,4 +248,18 @@ mod tests {
         assert_eq!(places("bar", "p_bar"), [true, false]);
         assert_eq!(places("N", "pull_N"), [false, true]);
     }
+
+    /// Of friction that grows with a load the catalogue has another law.
+    #[test]
+    fn what_presses_is_a_load_and_no_control() {
+        let guide = |column: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nf = \"drive_N\"\nq = \"{column}\"\n[parameters]\nc = {{ value = 2.0, min = 0.1 }}\n[states]\n\
+                 x = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"f - (c + 0.1*q)*v\", initial = 0.0 }}\n[outputs]\nx_m = \"x\"\n"
+            );
+            let simulation = Simulation::parse(&text, "guide.sim.toml").unwrap();
+            Structure::of(&simulation).slots.iter().any(|s| s.has("control"))
+        };
+        assert!(guide("coil_V") && !guide("clamp_N"));
+    }
 }

@@ -3,7 +3,7 @@
 use hysid_plant::{Expr, State};
 
 use super::Slot;
-use super::algebra::{constant_coefficient, quotient, unless_one};
+use super::algebra::{constant_coefficient, quotient, signals_in, unless_one};
 use super::connections::{Stretch, forces_of, is_negative};
 use super::find::Finder;
 use super::motion::{Kinematic, Motion, force_of, kinematic};
@@ -61,13 +61,13 @@ impl Finder<'_> {
             Kinematic::Neither => false,
         };
         let other = constant_coefficient(self.simulation, &ground, input)?;
-        let only = |s: &String| s == one.v || s == input || s == "pi" || self.simulation.parameter(s).is_some();
+        let others = |s: String| s != one.v && s != *input;
         // The integral of a controller's error is as long as a deflection; its gain is known, a spring's rate is not.
         let length = kinematic(self.simulation.unit_of(name).as_ref(), name) == Kinematic::Displacement;
         let rates = self.springs(one, name)?;
         if !(moves && length && rates.iter().all(|rate| self.is_estimated(rate, one)))
             || is_negative(&own) == is_negative(&other)
-            || !symbols.iter().all(only)
+            || signals_in(self.simulation, rate).any(others)
         {
             return None;
         }

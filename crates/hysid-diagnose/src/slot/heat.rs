@@ -4,7 +4,7 @@
 use hysid_plant::Expr;
 
 use super::Slot;
-use super::algebra::{coefficient, only_parameters, product};
+use super::algebra::{coefficient, only_parameters, product, signals_in};
 use super::find::Finder;
 use super::motion::{Kinematic, Motion, force_of};
 use super::pattern::factors;
@@ -16,9 +16,8 @@ impl Finder<'_> {
         let moves =
             |name: &str| self.motions.iter().any(|m| m.v == name) || self.kinematic_input(name) == Kinematic::Velocity;
         let is_end = |term: &Expr| {
-            let mut symbols =
-                term.symbols().into_iter().filter(|s| s != "pi" && self.simulation.parameter(s).is_none());
-            symbols.next().is_some_and(|s| moves(&s)) && symbols.next().is_none()
+            let mut signals = signals_in(self.simulation, term);
+            signals.next().is_some_and(|s| moves(&s)) && signals.next().is_none()
         };
         let is_slip =
             |e: &Expr| matches!(e.terms()[..], [(a, one), (b, other)] if a * b < 0.0 && is_end(one) && is_end(other));

@@ -2,7 +2,7 @@
 
 use hysid_plant::{BinaryOp, Expr, Simulation, State, Unit};
 
-use super::algebra::{constant_coefficient, only_parameters};
+use super::algebra::{constant_coefficient, only_parameters, signals_in};
 use super::find::{has_unit, is_one_of};
 use super::pattern::factors;
 use super::turn::{is_rate_of_turn, is_turn};
@@ -129,11 +129,10 @@ pub(super) const CHARGED: &[&str] = &["C", "V"];
 /// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name, or a capacitor that
 /// a current charges.
 fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Expr> {
-    let others = |s: &String| s != velocity && s != "pi" && simulation.parameter(s).is_none();
     let unit = || simulation.unit_of(&position.name);
     let charged = || has_unit(simulation.unit_of(velocity), &["A"]) && has_unit(unit(), CHARGED);
     let moved = kinematic(unit().as_ref(), &position.name) == Kinematic::Displacement || charged();
-    if position.derivative.symbols().iter().any(others) || !moved {
+    if signals_in(simulation, &position.derivative).any(|s| s != velocity) || !moved {
         return None;
     }
     constant_coefficient(simulation, &position.derivative, velocity)

@@ -203,16 +203,6 @@ fn only_a_controlled_damping_has_a_control() {
         let has = Structure::of(&simulation).slots.iter().any(|s| s.has("control"));
         assert_eq!(has, controlled, "{}", simulation.title);
     }
-    // What presses is a load: of friction that grows with it the catalogue has another law.
-    let guide = |column: &str| {
-        let text = format!(
-            "[time]\nperiod_s = 0.01\n[inputs]\nf = \"drive_N\"\nq = \"{column}\"\n[parameters]\nc = {{ value = 2.0, min = 0.1 }}\n[states]\n\
-             x = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"f - (c + 0.1*q)*v\", initial = 0.0 }}\n[outputs]\nx_m = \"x\"\n"
-        );
-        let simulation = hysid_plant::Simulation::parse(&text, "guide.sim.toml").unwrap();
-        Structure::of(&simulation).slots.iter().any(|s| s.has("control"))
-    };
-    assert!(guide("coil_V") && !guide("clamp_N"));
 }
 
 /// A plant that moves has stores and windings too, where the units say so.
