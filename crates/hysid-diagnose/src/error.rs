@@ -65,9 +65,18 @@ pub enum DiagnoseError {
         /// The inputs.
         columns: String,
     },
-    /// The same file as estimation and hold-out.
-    #[error("{0}: given as --recording and as --holdout; the hold-out must be data that the estimation never sees")]
-    SameData(String),
+    /// A hold-out of which half or more is in a recording that is learnt from.
+    #[error(
+        "{recording}: {rows} of its rows stand in {learnt}, too, which is learnt from; the hold-out must be data that the estimation never sees"
+    )]
+    SeenBefore {
+        /// The hold-out.
+        recording: String,
+        /// The recording for estimation.
+        learnt: String,
+        /// How many rows: all of them where one is a copy of the other.
+        rows: usize,
+    },
     /// The simulation cannot be used.
     #[error("{file}: {problem}")]
     Simulation {

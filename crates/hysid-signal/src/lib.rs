@@ -23,7 +23,7 @@ pub use excitation::{Excitation, ExcitationError, modulate};
 pub use median::median;
 pub use mix::mixed;
 pub use noise::{NoiseError, autoregressive_noise, variance_for_snr, white_noise};
-pub use overlap::rows_in_both;
+pub use overlap::{rows_in_both, rows_seen};
 pub use range::range;
 pub use recording::{Channel, Clock, Recording, RecordingError, Segment};
 pub use spectrum::{

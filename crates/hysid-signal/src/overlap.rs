@@ -23,6 +23,19 @@ pub fn rows_in_both(recording: &Recording, other: &Recording) -> usize {
     rows
 }
 
+/// Share of a hold-out's rows from which it is not what the estimation never sees.
+const MOST_IN_COMMON: f64 = 0.5;
+
+/// The number of rows of a hold-out that stand in a recording which is learnt from, too, where these are at least half of it: all of them where
+/// it is a copy. `None` where it is data that the estimation never sees.
+pub fn rows_seen(holdout: &Recording, learnt: &Recording) -> Option<usize> {
+    if holdout.same_samples(learnt) {
+        return Some(holdout.len());
+    }
+    let rows = rows_in_both(holdout, learnt);
+    (rows > 0 && rows as f64 >= MOST_IN_COMMON * holdout.len() as f64).then_some(rows)
+}
+
 /// Equal rows that follow each other.
 struct Level {
     /// Of the samples of a row.
@@ -87,6 +100,16 @@ mod tests {
         assert_eq!(rows_in_both(&Recording::new("s", whole.clock(), channels.clone()).unwrap(), &whole), 500);
         channels.pop();
         assert_eq!(rows_in_both(&Recording::new("s", whole.clock(), channels).unwrap(), &whole), 0);
+    }
+
+    #[test]
+    fn a_copy_and_a_half_are_seen_and_less_is_not() {
+        let whole = recording((0..500).map(noisy));
+        assert_eq!(rows_seen(&recording((300..700).map(noisy)), &whole), Some(200));
+        assert_eq!(rows_seen(&recording((301..701).map(noisy)), &whole), None);
+        // A machine at rest, copied.
+        let rest = recording((0..400).map(|_| (0.0, 0.0)));
+        assert_eq!(rows_seen(&rest, &rest), Some(400));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hysid_io::{ReadOptions, TimeSource, read_recording};
 use hysid_signal::tell::{brief, digits};
-use hysid_signal::{Recording, rows_in_both};
+use hysid_signal::{Recording, rows_seen};
 
 use super::fit::TIME;
 use crate::failure::Failure;
@@ -73,9 +73,6 @@ pub struct Intake {
     pub holdout: Vec<Recording>,
 }
 
-/// Share of a hold-out's rows from which it is not what the estimation never sees.
-const MOST_IN_COMMON: f64 = 0.5;
-
 impl Intake {
     /// Recordings with the files that they were read from. Two that would have the same name (that of the file without its folders) are named by
     /// their paths.
@@ -88,14 +85,11 @@ impl Intake {
     ) -> Result<Self, Failure> {
         for (file, h) in holdout.0.iter().zip(&holdout.1) {
             for (learnt, e) in estimation.0.iter().zip(&estimation.1) {
-                let what = if e.same_samples(h) {
+                let Some(rows) = rows_seen(h, e) else { continue };
+                let what = if rows == h.len() && rows == e.len() {
                     format!("it holds the same data as {}, which", learnt.display())
                 } else {
-                    let same = rows_in_both(h, e);
-                    if same == 0 || (same as f64) < MOST_IN_COMMON * h.len() as f64 {
-                        continue;
-                    }
-                    format!("{same} of its {} rows stand in {}, too, which", h.len(), learnt.display())
+                    format!("{rows} of its {} rows stand in {}, too, which", h.len(), learnt.display())
                 };
                 return Err(Failure::BadInput(format!(
                     "{}: {what} is a --recording; the hold-out must be data that the estimation never sees",

@@ -123,6 +123,17 @@ fn wrong_parameters_are_no_missing_physics() {
     assert!(before < 1.3 * noise, "{before} {noise}");
 }
 
+/// Where noise hides nearly all of the output, what the recalibrated clone leaves may be anything.
+#[test]
+fn parameters_do_not_account_for_what_no_simulation_explains() {
+    let truth = "[parameters]\ng = { value = 4.6, fixed = true }\n[states]\nx = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"g*u - 100*x - 2.2*v\", initial = 0.0 }\n[outputs]\ny_mm = \"x\"\n";
+    let d = Case { simulator: OSCILLATOR, truth, noise: 1.5, level: 2.0 }.diagnosed();
+    assert_eq!(d["verdict"], "no_significant_mismatch", "{d:#}");
+    let summary = d["summary"].as_str().unwrap();
+    assert!(summary.contains("next to nothing") && summary.contains("frequency 9 ->"), "{summary}");
+    assert!(!summary.contains("no missing physics"), "{summary}");
+}
+
 #[test]
 fn a_sensor_that_saturates_is_found_at_the_output() {
     let truth = OSCILLATOR.replace("y_mm = \"x\"", "y_mm = \"max(-0.07, min(0.07, x))\"");

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use hysid_signal::rows_seen;
+
 use super::{DataSet, held_out_blocks};
 use crate::error::DiagnoseError;
 use crate::mechanism::mechanism;
@@ -47,13 +49,7 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
     let (full, held) = if request.holdout.is_empty() {
         split_blocks(&all)
     } else {
-        if let Some(same) = request
-            .holdout
-            .iter()
-            .find(|h| request.estimation.iter().any(|e| e.same_samples(h) && e.clock() == h.clock()))
-        {
-            return Err(DiagnoseError::SameData(same.name().to_owned()));
-        }
+        never_seen(request)?;
         (all, DataSet::new(simulation, request.holdout, 0)?)
     };
     let mut notes = full.notes.clone();
@@ -64,6 +60,19 @@ pub fn intake(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Intake, Diagno
     let fresh: Vec<String> = whole.notes.iter().filter(|n| !notes.contains(n)).cloned().collect();
     notes.extend(fresh);
     Ok(Intake { whole, held, notes })
+}
+
+/// Nothing is chosen on a hold-out, so that it must not be learnt from.
+fn never_seen(request: &Request<'_>) -> Result<(), DiagnoseError> {
+    for h in request.holdout {
+        for e in request.estimation {
+            if let Some(rows) = rows_seen(h, e) {
+                let (recording, learnt) = (h.name().to_owned(), e.name().to_owned());
+                return Err(DiagnoseError::SeenBefore { recording, learnt, rows });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// What is asked must be of the catalogue, and the simulation must have a place for it.

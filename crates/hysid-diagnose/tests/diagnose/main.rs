@@ -225,6 +225,10 @@ fn bad_input_is_refused_with_a_reason() {
         Recording::new("bad.csv", Clock { start_s: 0.0, period_s }, channels).unwrap()
     };
     let channel = |name: &str, samples: Vec<f64>| Channel { name: name.into(), samples };
+    let part = || {
+        let cut = |c: &Channel| channel(&c.name, c.samples[100..250].to_vec());
+        with(good().channels().iter().map(cut).collect(), PERIOD)
+    };
     let ramp: Vec<f64> = (0..300).map(f64::from).collect();
     let cases: Vec<(&str, Result<Diagnosis, DiagnoseError>, &str)> = vec![
         ("no recording", run(BASELINE, &[], &[good()]), "at least one"),
@@ -248,6 +252,7 @@ fn bad_input_is_refused_with_a_reason() {
             "constant",
         ),
         ("the same data twice", run(BASELINE, &[good()], &[good()]), "never sees"),
+        ("a part of the data once more", run(BASELINE, &[good()], &[part()]), "150 of its rows"),
         ("too few samples", run(BASELINE, &[recording("short.csv", 1, 12, |_, _| 0.0)], &[]), "at least"),
         (
             "all inputs missing",

@@ -58,7 +58,7 @@ impl Files<'_> {
         | E::ConstantOutput { recording, .. }
         | E::NothingDrives { recording, .. }
         | E::Explodes { recording, .. }
-        | E::SameData(recording) = &mut error
+        | E::SeenBefore { recording, .. } = &mut error
             && let Some(path) = intake.path(recording, self.estimation, self.holdout)
         {
             *recording = path.display().to_string();

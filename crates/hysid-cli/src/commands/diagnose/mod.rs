@@ -115,8 +115,10 @@ fn work(args: &Args) -> Result<(), Failure> {
             let mut outcome = answer(&stand_in.simulation, column, (&files, &intake), &questions, options, &watch)?;
             if let Some(moved) = stand_in.moved(&outcome.file.calibrated_parameters) {
                 if outcome.file.verdict == VerdictKind::NoSignificantMismatch {
-                    outcome.file.summary =
-                        format!("{} {moved} This is a parameter error, no missing physics.", outcome.file.summary);
+                    outcome.file.summary = format!("{} {moved}", outcome.file.summary);
+                    if follows(&outcome) {
+                        outcome.file.summary += " This is a parameter error, no missing physics.";
+                    }
                 } else {
                     outcome.file.notes.insert(0, moved);
                 }
@@ -143,6 +145,11 @@ fn work(args: &Args) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// Whether nothing speaks against a simulation in which no mismatch was found: it explains the outputs, as well as a model without any physics does.
+fn follows(outcome: &Diagnosis) -> bool {
+    outcome.picture.unexplained().is_empty() && outcome.file.fit.iter().all(|f| f.outdone().is_none())
 }
 
 /// A set of effects as it is typed: `coulomb_friction@state:v+delay@input:u`.
