@@ -9,6 +9,8 @@ pub enum Grid {
     Reach(&'static str, Vec<f64>),
     /// The same, and the periods over that signal to which the residual points.
     Turns(&'static str, Vec<f64>),
+    /// These multiples of the measure, as many waves over an angle, and so few that its size is this many radians in one: there a wave is a power.
+    Waves(&'static str, Vec<f64>, f64),
     /// Quantiles of the absolute value of a slot's signal.
     Quantiles(&'static str, Vec<f64>),
     /// Quantiles of a slot's signal.

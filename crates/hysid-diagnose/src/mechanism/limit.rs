@@ -54,8 +54,9 @@ mod tests {
         for id in ["input_saturation", "output_saturation"] {
             let limit = mechanism(id).unwrap();
             let slot = limit.slots(&structure).remove(0);
-            let first =
-                |above: f64, below: f64| limit.fitted_first(&slot, &[("a_p".into(), above), ("a_n".into(), below)]);
+            let first = |above: f64, below: f64| {
+                limit.fitted_first(&slot, &[("a_p".into(), above), ("a_n".into(), below)], &[])
+            };
             assert_eq!(first(0.9, 0.8), Purpose::Refit);
             assert_eq!(first(1.1, -0.1), Purpose::Form(Form::Other));
             // Nobody knows of a side that was never reached.
@@ -69,6 +70,6 @@ mod tests {
         // A law of one side has none to leave out.
         let friction = mechanism("coulomb_friction").unwrap();
         let slot = friction.slots(&structure).remove(0);
-        assert_eq!(friction.fitted_first(&slot, &[("F_c".into(), 1.0)]), Purpose::Refit);
+        assert_eq!(friction.fitted_first(&slot, &[("F_c".into(), 1.0)], &[]), Purpose::Refit);
     }
 }

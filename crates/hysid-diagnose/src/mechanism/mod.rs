@@ -150,9 +150,18 @@ impl Mechanism {
 
     /// What it is fitted as at first, where these are the amplitudes of its screening form that explain a residual best: a law of two sides of which one
     /// does next to nothing as [`Form::Other`] (above) or [`Form::Few`] (below), but for one that the signal never reached; of laws that are screened one by one the form with this amplitude;
-    /// a law that is there or not, and of which less than the whole is there, as [`Form::Soft`].
-    pub(crate) fn fitted_first(&self, slot: &Slot, amplitudes: &[(String, f64)]) -> Purpose {
-        match (self.law_at(slot, Purpose::Screening).amplitudes, amplitudes) {
+    /// a law that is there or not, and of which less than the whole is there, as [`Form::Soft`]; a wave that is a power at the best of these `shapes` as [`Form::Other`].
+    pub(crate) fn fitted_first(&self, slot: &Slot, amplitudes: &[(String, f64)], shapes: &[(String, f64)]) -> Purpose {
+        let screened = self.law_at(slot, Purpose::Screening);
+        let power = |(p, (_, value)): (&LawParameter, &(String, f64))| match &p.role {
+            Role::Shape(Grid::Waves(_, multiples, _)) => multiples.iter().all(|m| value < m),
+            _ => false,
+        };
+        let shaped = screened.parameters.iter().filter(|p| matches!(p.role, Role::Shape(_)));
+        if shaped.zip(shapes).any(power) {
+            return Purpose::Form(Form::Other);
+        }
+        match (screened.amplitudes, amplitudes) {
             (Amplitudes::Apart, [(name, _)]) => {
                 let amplitude = |p: &&LawParameter| p.role == Role::Amplitude;
                 let has_it = |law: &Law| law.parameters.iter().filter(amplitude).map(|p| &p.name).eq([name]);

@@ -4,7 +4,7 @@
 //! law change a simulation without any physics. If a variant fits the recording clearly better than the calibrated baseline,
 //! that is to be said before physics is blamed.
 
-use hysid_plant::{Expr, Function, Hold, Memory, Simulation};
+use hysid_plant::{Expr, Function, Hold, Memory, Parameter, Simulation};
 
 use crate::mechanism::{Block, Family, Law, Mechanism};
 use crate::slot::Structure;
@@ -43,6 +43,10 @@ pub const SHARPER: &str = "smoothed friction three times as sharp";
 
 /// Euler's explicit method in the place of the equations.
 const EXPLICIT: &str = "explicit steps of a sampling period, as a machine that is emulated takes them";
+/// The same with shorter steps, of a length that is fitted.
+const SHORTER: &str = "explicit steps of a part of a sampling period, as a machine that is emulated takes them";
+/// Share of the sampling period from which the length of such steps is fitted.
+const FIRST_SHARE: f64 = 0.25;
 
 /// The variants of a simulation whose outputs are to be compared with its own.
 ///
@@ -67,7 +71,9 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
     if late.validate().is_ok() {
         found.push(Variant { what: "outputs half a sample late", simulation: late });
     }
-    found.extend(explicit(simulation, period_s).map(|simulation| Variant { what: EXPLICIT, simulation }));
+    let whole = explicit(simulation, Expr::Number(period_s));
+    found.extend(whole.map(|simulation| Variant { what: EXPLICIT, simulation }));
+    found.extend(shorter(simulation, period_s).map(|simulation| Variant { what: SHORTER, simulation }));
     let slots = Structure::of(simulation).slots;
     let sharpened = |sticks: bool| {
         let mut other = simulation.clone();
@@ -98,13 +104,13 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
 /// where there is no state, or a memory that knows nothing of steps.
 ///
 /// Reference: E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed. (2006), sec. IX.1 (modified equations).
-fn explicit(simulation: &Simulation, step_s: f64) -> Option<Simulation> {
+fn explicit(simulation: &Simulation, step: Expr) -> Option<Simulation> {
     if simulation.is_static() || simulation.states.iter().any(|s| s.derivative.has_memory()) {
         return None;
     }
     let earlier = |e: Expr| match &e {
         Expr::Symbol(name) => match simulation.state(name) {
-            Some(state) => e - Expr::Number(step_s / 2.0) * state.derivative.clone(),
+            Some(state) => e - step.clone() / Expr::Number(2.0) * state.derivative.clone(),
             None => e,
         },
         _ => e,
@@ -113,6 +119,15 @@ fn explicit(simulation: &Simulation, step_s: f64) -> Option<Simulation> {
     other.time.hold = Hold::Zero;
     other.states.iter_mut().for_each(|s| s.derivative = s.derivative.map(&mut |e| earlier(e)));
     other.validate().is_ok().then_some(other)
+}
+
+/// [`explicit`] with steps shorter than a sampling period, whose length is a parameter.
+fn shorter(simulation: &Simulation, period_s: f64) -> Option<Simulation> {
+    let mut other = simulation.clone();
+    let step = Parameter::new(other.fresh_symbol("h_e"), FIRST_SHARE * period_s).within(0.0, period_s);
+    let symbol = Expr::Symbol(step.name.clone());
+    other.parameters.push(step);
+    explicit(&other, symbol)
 }
 
 fn uses_state(simulation: &Simulation, arguments: &[Expr]) -> bool {
@@ -152,7 +167,7 @@ mod tests {
             let run = compiled.simulate(&Run::new(&drive, &compiled.theta()));
             run.outputs[0].iter().zip(&emulated).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
         };
-        let variant = explicit(&simulation, h).unwrap();
+        let variant = explicit(&simulation, Expr::Number(h)).unwrap();
         assert!(off(&variant) < 0.1 * off(&simulation), "{} {}", off(&variant), off(&simulation));
     }
 }

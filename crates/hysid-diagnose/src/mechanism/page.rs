@@ -80,6 +80,7 @@ fn parameters(law: &Law) -> String {
                 Grid::Turns(s, v) => {
                     format!("{} shares of half the range of {s}, lines of the residual over {s}", v.len())
                 }
+                Grid::Waves(s, v, _) => format!("{} values, and one so small that a wave over {s} is a power", v.len()),
                 Grid::Quantiles(s, v) => format!("{} quantiles of the size of {s}", v.len()),
                 Grid::SignedQuantiles(s, v) => format!("{} quantiles of {s}", v.len()),
                 Grid::Times(n) => format!("{n} moments"),

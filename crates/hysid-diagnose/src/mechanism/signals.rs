@@ -155,6 +155,10 @@ impl Signals {
                 let reach = if reach > 0.0 { reach } else { size };
                 shares.iter().map(|s| s * reach).chain(self.pointed(grid).iter().copied()).collect()
             }
+            Grid::Waves(angle, multiples, within) => {
+                let reach = Expr::parse(angle).ok().and_then(|a| self.size_of(&a)).filter(|reach| *reach > 0.0);
+                multiples.iter().map(|m| m * size).chain(reach.map(|reach| within / reach)).collect()
+            }
             Grid::Quantiles(symbol, shares) => at(&self.sorted(symbol, f64::abs), shares),
             Grid::SignedQuantiles(symbol, shares) => at(&self.sorted(symbol, |v| v), shares),
             Grid::Times(count) => {

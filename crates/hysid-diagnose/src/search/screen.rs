@@ -225,7 +225,8 @@ pub fn screen_along(
             let mut points = features(along, &screening, slot, &values, own, r, total)?;
             points.sort_by(|a, b| b.score.total_cmp(&a.score));
             points.iter_mut().skip(JOINT).for_each(|p| p.joint = None);
-            let purpose = mechanism.fitted_first(slot, &points.first()?.amplitudes);
+            let best = points.first()?;
+            let purpose = mechanism.fitted_first(slot, &best.amplitudes, &best.shapes);
             let refit = mechanism.rewrite(&document, slot, signals, purpose).ok()?;
             Some(Candidate { mechanism, slot: (*slot).clone(), refit, points, lacking: mechanism.lacking(signals) })
         })

@@ -126,16 +126,19 @@ pub(super) fn angle(unit: &Unit) -> Option<Expr> {
 /// Units of what a capacitor has.
 pub(super) const CHARGED: &[&str] = &["C", "V"];
 
-/// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name, or a capacitor that
-/// a current charges.
-fn scale(simulation: &Simulation, position: &State, velocity: &str) -> Option<Expr> {
-    let unit = || simulation.unit_of(&position.name);
-    let charged = || has_unit(simulation.unit_of(velocity), &["A"]) && has_unit(unit(), CHARGED);
-    let moved = kinematic(unit().as_ref(), &position.name) == Kinematic::Displacement || charged();
-    if signals_in(simulation, &position.derivative).any(|s| s != velocity) || !moved {
+/// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name, a capacitor that
+/// a current charges, or one of two states without dimension that acts back on the other, as in equations that are made dimensionless.
+fn scale(simulation: &Simulation, position: &State, velocity: &State) -> Option<Expr> {
+    let unit = || shown_unit(simulation, &position.name);
+    let charged = || has_unit(simulation.unit_of(&velocity.name), &["A"]) && has_unit(unit(), CHARGED);
+    let bare = |unit: Option<Unit>| unit.is_none_or(|u| u.is_none());
+    let restored =
+        || bare(unit()) && bare(shown_unit(simulation, &velocity.name)) && velocity.derivative.uses(&position.name);
+    let moved = kinematic(unit().as_ref(), &position.name) == Kinematic::Displacement || charged() || restored();
+    if signals_in(simulation, &position.derivative).any(|s| s != velocity.name) || !moved {
         return None;
     }
-    constant_coefficient(simulation, &position.derivative, velocity)
+    constant_coefficient(simulation, &position.derivative, &velocity.name)
 }
 
 /// Units of what a mass holds of its velocity.
@@ -177,7 +180,7 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
     let known = || others.iter().copied();
     let mut found = Vec::new();
     for velocity in known() {
-        let scaled = |s: &&State| scale(simulation, s, &velocity.name);
+        let scaled = |s: &&State| scale(simulation, s, velocity);
         let position = known().find(|s| s.derivative == Expr::symbol(&velocity.name));
         let (position, scale) = match position {
             Some(x) => (Some(x), None),
@@ -210,6 +213,28 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_state_without_dimension_is_a_displacement_where_it_acts_back() {
+        let found = |unit: &str, rate: &str, force: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 1e-6\n[inputs]\nu = \"drive_V\"\n[parameters]\nw = {{ value = 1e4, min = 1.0, unit = \"1/s\" }}\n\
+                 [states]\ns = {{ derivative = \"w*({force})\", initial = 0.0, unit = \"{unit}\" }}\n\
+                 y = {{ derivative = \"{rate}\", initial = 0.0, unit = \"{unit}\" }}\n[outputs]\nout = \"y\"\n"
+            );
+            let simulation = Simulation::parse(&text, "comb.sim.toml").unwrap();
+            motions(&simulation, &simulation)
+                .iter()
+                .map(|m| (m.x.map(str::to_owned), m.state.to_owned()))
+                .collect::<Vec<_>>()
+        };
+        let moving = vec![(Some("y".to_owned()), "s".to_owned())];
+        assert_eq!(found("-", "w*s", "u - s/50 - y"), moving);
+        assert_eq!(found("-", "w*s", "u - s/50 - sin(y)"), moving);
+        assert!(found("-", "w*s", "u - s/50").is_empty(), "a sum of what a lag shows");
+        assert!(found("-", "w*(s - y)", "u - s/50 - y").is_empty(), "a second lag");
+        assert!(found("mol/l", "w*s", "u - s/50 - y").is_empty());
+    }
 
     #[test]
     fn a_momentum_is_told_by_its_unit_or_its_mass_and_a_speed_by_what_shows_it() {

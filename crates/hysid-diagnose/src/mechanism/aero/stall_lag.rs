@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn where_the_flow_never_separates_the_whole_stall_may_be_missing() {
         let slot = slot_where(&STALL_LAG, |s| s.separation().is_none()).unwrap();
-        let first = |name: &str| STALL_LAG.fitted_first(&slot, &[(name.to_owned(), 1.0)]);
+        let first = |name: &str| STALL_LAG.fitted_first(&slot, &[(name.to_owned(), 1.0)], &[]);
         assert_eq!([first("C_s"), first("C_l")], [Purpose::Refit, Purpose::Form(Form::Other)]);
     }
 }

@@ -67,7 +67,7 @@ mod tests {
     fn of_the_ways_in_which_a_loop_wears_the_one_that_explains_most_is_fitted_first() {
         let slot = slot_where(&DEGRADATION, |s| s.place == Place::Loop).unwrap();
         for name in ["d_A", "d_nu", "d_eta"] {
-            let first = DEGRADATION.law_at(&slot, DEGRADATION.fitted_first(&slot, &[(name.to_owned(), 1.0)]));
+            let first = DEGRADATION.law_at(&slot, DEGRADATION.fitted_first(&slot, &[(name.to_owned(), 1.0)], &[]));
             let names: Vec<&str> = first.parameters.iter().map(|p| p.name.as_str()).collect();
             assert_eq!(names, [name]);
         }

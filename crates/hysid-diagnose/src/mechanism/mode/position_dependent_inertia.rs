@@ -19,7 +19,8 @@ pub static POSITION_DEPENDENT_INERTIA: Mechanism = Mechanism {
             _ if !slot.has("rad") => with_the_square(slot),
             Purpose::Form(Form::Other) if slot.has("x") => with_the_square(slot),
             Purpose::Screening => {
-                over_the_turn(slot, "n_w").shape("n_w", "1", Grid::Values(vec![2.0, 1.0])).within(0.5, 4.0)
+                let angle = slot.angle().unwrap_or("rad*x");
+                over_the_turn(slot, "n_w").shape("n_w", "1", Grid::Waves(angle, vec![2.0, 1.0], 0.5)).within(1e-4, 4.0)
             }
             Purpose::Form(Form::Few) => over_the_turn(slot, "1"),
             _ => over_the_turn(slot, "2"),

@@ -66,7 +66,7 @@ mod tests {
                 law(label, Purpose::Screening).contains("sqrt") && law(label, Purpose::Screening).contains("s/s_r")
             );
             let slot = slots.iter().find(|s| s.label == label).unwrap();
-            let fitted = |name: &str| LEAKAGE.fitted_first(slot, &[(name.to_owned(), 1.0)]);
+            let fitted = |name: &str| LEAKAGE.fitted_first(slot, &[(name.to_owned(), 1.0)], &[]);
             assert_eq!(["q_l", "q_o"].map(fitted), [Purpose::Refit, Purpose::Form(Form::Other)]);
         }
     }
