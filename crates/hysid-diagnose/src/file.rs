@@ -195,12 +195,20 @@ pub struct FitRecord {
 /// Share of the error of a simulation in which nothing is missing, or all that was, that a black box leaves at least: it cannot predict noise either.
 const NEVER_BETTER: f64 = 0.75;
 
+/// Ratio of the errors of two simulations up to which they are as good as each other.
+const TRIFLE: f64 = 1.02;
+
 impl FitRecord {
     /// The share of the error of the augmented simulation, or of the simulation as it is where none is written, that a black box leaves, where that is so much
     /// less that something is missing still: a model without any physics predicts what neither has seen far better.
     pub fn outdone(&self) -> Option<f64> {
         let share = self.rmse_black_box? / self.rmse_after.or(self.rmse_before)?;
         (share < NEVER_BETTER).then_some(share)
+    }
+
+    /// The ratio of the errors where the augmented simulation is worse on the hold-out than the simulation as it is, beyond chance and by more than a trifle.
+    pub fn refuted(&self) -> Option<f64> {
+        self.ratio.filter(|ratio| *ratio > TRIFLE && self.ratio_low.is_some_and(|low| low > 1.0))
     }
 }
 

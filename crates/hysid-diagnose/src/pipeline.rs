@@ -155,6 +155,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let rate = file.correction.as_ref().and_then(|c| told_rate(&c.loudest()?.term));
     let varying = rate.or(varying).or(wanders);
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
+    if let Some(refutation) = refutation(&file) {
+        file.summary = format!("{} {refutation}", file.summary);
+    }
     if runs_away {
         file.summary = "The simulation runs away by itself: no free run of it can follow the recording, and nothing can be said of what it lacks.".into();
         file.notes.push("a deviation of the initial state too small to be seen grows beyond the output within the recording, as in a plant that only a controller holds: put the controller into the simulation, with the reference as its input, or give many short recordings".into());

@@ -9,7 +9,7 @@ use super::locate;
 use super::report_values::{reported, sentence};
 use crate::data::DataSet;
 use crate::file::*;
-use crate::mechanism::{Block, number_with_unit};
+use crate::mechanism::{Block, Family, number_with_unit};
 use crate::model::base::{Base, Interval};
 use crate::model::hold::FreeRun;
 use crate::model::hypothesis::{Effect, Hypothesis};
@@ -298,6 +298,23 @@ pub fn without_mismatch(unexplained: &[(&str, f64)]) -> Option<String> {
     })
 }
 
+/// Families whose effects go by the clock of a recording.
+const IN_TIME: [Family; 3] = [Family::TimeVariation, Family::SensorDrift, Family::ExternalDisturbance];
+
+/// What the hold-out says against the augmented simulation, which it has not chosen and does not take back; `None` where it says nothing.
+pub fn refutation(file: &DiagnosisFile) -> Option<String> {
+    let worse = |fit: &FitRecord| {
+        let told = |ratio: f64| format!("{} times the error of `{}` on {}", number(ratio), fit.output, fit.recording);
+        fit.refuted().map(told)
+    };
+    let told: Vec<String> = file.fit.iter().filter_map(worse).collect();
+    let in_time = file.effects.iter().any(|e| IN_TIME.iter().any(|family| e.family == family.name()));
+    let why = if in_time { ": what changed during one recording need not change in another" } else { "" };
+    (!told.is_empty()).then(|| {
+        format!("The hold-out does not bear it out: the simulation makes {} with it{why}.", told.join(" and "))
+    })
+}
+
 /// What became of the sets that the caller wanted weighed.
 pub fn answers(pool: &[Hypothesis<'_>], questions: &[Question]) -> Vec<String> {
     let top = pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
@@ -344,5 +361,22 @@ mod tests {
         assert_eq!(place("output:x_m", "output", "none", &[("y^2", 0.9)]), "output");
         assert_eq!(place("input:u", "input", "none", &[("u^2", 0.9)]), "input");
         assert_eq!(place("parameter:k", "time", "none", &[("k*sin(2.5*t)", 0.9)]), "time_variation");
+    }
+
+    #[test]
+    fn what_the_hold_out_refutes_is_told() {
+        let fit = |ratio: f64, low: f64| FitRecord {
+            recording: "val.csv".into(),
+            output: "h_m".into(),
+            rmse_before: Some(1.0),
+            rmse_after: Some(ratio),
+            ratio: Some(ratio),
+            ratio_low: Some(low),
+            ratio_high: Some(2.0 * ratio),
+            rmse_black_box: None,
+        };
+        let refuted = |ratio, low| fit(ratio, low).refuted();
+        assert_eq!(refuted(1.5, 1.2), Some(1.5));
+        assert_eq!((refuted(1.5, 0.9), refuted(1.01, 1.005), refuted(0.5, 0.4)), (None, None, None));
     }
 }

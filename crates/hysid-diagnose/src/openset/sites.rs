@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hysid_plant::{Expr, Output, Simulation, Slot as Place};
 
-use crate::slot::{OWN_VELOCITY, Place as Slotted, Slot, Structure, is_turn};
+use crate::slot::{OWN_VELOCITY, Place as Slotted, Slot, Structure, is_place, is_turn};
 
 /// A signal that terms are written over.
 #[derive(Debug, Clone)]
@@ -48,19 +48,21 @@ pub struct Site {
     pub acceleration: Option<Symbol>,
     /// What turns elsewhere, where something moves here: its speed and its angle in rad.
     pub turning: Vec<[Symbol; 2]>,
+    /// The rates of inputs that are places: what a length changes that someone else pays out has forces of that rate in it (a load on a rope that is hoisted).
+    pub led: Vec<Symbol>,
 }
 
 impl Site {
     /// A site at which nothing else is looked at than what is there.
     fn alone(place: Place, slot: String, side: &'static str, own: Vec<Symbol>) -> Self {
-        let (others, parts, turning) = (Vec::new(), Vec::new(), Vec::new());
-        Self { place, slot, side, own, rate: None, others, parts, acceleration: None, turning }
+        let (others, parts, turning, led) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { place, slot, side, own, rate: None, others, parts, acceleration: None, turning, led }
     }
 
     /// All that terms are written over, in this order.
     pub fn symbols(&self) -> impl Iterator<Item = &Symbol> {
         let turning = self.turning.iter().flatten();
-        self.own.iter().chain(&self.rate).chain(&self.others).chain(&self.acceleration).chain(turning)
+        self.own.iter().chain(&self.rate).chain(&self.others).chain(&self.acceleration).chain(turning).chain(&self.led)
     }
 
     /// What [`Self::others`] are among [`Self::symbols`].
@@ -73,6 +75,12 @@ impl Site {
     pub fn turns(&self) -> impl Iterator<Item = [usize; 2]> {
         let start = self.elsewhere().end + usize::from(self.acceleration.is_some());
         (0..self.turning.len()).map(move |i| [start + 2 * i, start + 2 * i + 1])
+    }
+
+    /// What [`Self::led`] are among [`Self::symbols`]: the last.
+    pub fn led(&self) -> Range<usize> {
+        let end = self.symbols().count();
+        end - self.led.len()..end
     }
 }
 
@@ -132,7 +140,17 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
     let parts: Vec<(usize, usize)> = (0..others.len()).filter_map(|x| Some((x, velocity(&others[x])?))).collect();
     let moves = own.iter().any(|s| s.velocity) && !parts.is_empty();
     let acceleration = moves.then(|| Symbol::new(&format!("acc_{}", state.name), state.derivative.clone()));
-    Site { rate, others, parts, acceleration, turning, ..Site::alone(Place::State(i), label, "plant", own) }
+    let led = if own.is_empty() { Vec::new() } else { led(simulation) };
+    Site { rate, others, parts, acceleration, turning, led, ..Site::alone(Place::State(i), label, "plant", own) }
+}
+
+/// The rates of the inputs that are places, of a simulation that is driven by something else, too.
+fn led(simulation: &Simulation) -> Vec<Symbol> {
+    if simulation.inputs.len() < 2 {
+        return Vec::new();
+    }
+    let places = simulation.inputs.iter().map(|u| u.symbol.as_str()).filter(|u| is_place(simulation, u));
+    places.map(|u| Symbol::new(&format!("rate_{u}"), Expr::symbol(u).derivative_of_input())).collect()
 }
 
 /// The speeds and angles of what turns without a part in a slot's own coordinates, as a rotor in a machine that stands on springs.
@@ -190,5 +208,23 @@ mod tests {
         assert!(turning_at("state:n", speed).is_empty());
         let angle = "q = { derivative = \"n*6\", initial = 0.0, unit = \"deg\" }\n";
         assert_eq!(turning_at("state:v", &format!("{speed}{angle}")), ["n: pi/180*q"]);
+    }
+
+    #[test]
+    fn what_is_paid_out_has_forces_of_its_rate() {
+        let led_at = |inputs: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\n{inputs}\n[parameters]\nc = {{ value = 1.0, min = 0.1 }}\n[states]\n\
+                 q = {{ derivative = \"w\", initial = 0.0, unit = \"rad\" }}\nw = {{ derivative = \"-9.81*q/l - c*w\", initial = 0.0, unit = \"rad/s\" }}\n\
+                 [outputs]\nq_rad = \"q\"\n"
+            );
+            let simulation = Simulation::parse(&text, "crane.sim.toml").unwrap();
+            let sites = sites(&simulation, &Structure::of(&simulation));
+            let site = sites.iter().find(|s| s.slot == "state:w").unwrap();
+            site.led().map(|i| site.symbols().nth(i).unwrap().meaning.to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!(led_at("a = \"trolley_m_s2\"\nl = \"rope_m\""), ["d(l)"]);
+        assert!(led_at("a = \"trolley_m_s2\"\nl = \"load_kg\"").is_empty(), "no place");
+        assert!(led_at("l = \"rope_m\"").is_empty(), "what drives it is there already");
     }
 }

@@ -7,7 +7,7 @@ use hysid_plant::{BinaryOp, Expr, Simulation};
 
 use super::algebra::{Factors, only_parameters, product, quotient};
 use super::find::has_unit;
-use super::motion::{ForcePath, Motion, force_path, motions};
+use super::motion::{ForcePath, Motion, force_path, is_momentum, motions};
 use super::turn::is_rate_of_turn;
 
 /// The same simulation with such numbers in the mass, `(F - c*v - k*x)/(m/1000)`, and such accelerations among the forces, `(F - c*v - k*x - m*a_g)/m`.
@@ -38,7 +38,9 @@ fn is_sum(expr: &Expr) -> bool {
 /// motion stand beside it. What turns has the moment of inertia that its unit asks for.
 fn gathered(simulation: &Simulation, motion: &Motion<'_>) -> Option<Expr> {
     let terms = motion.derivative.terms();
-    if terms.len() < 2 || !matches!(force_path(simulation, motion.derivative), ForcePath::Bare) {
+    // The rate of a momentum is a force as it is; what divides the momentum in it makes it a velocity.
+    let momentum = simulation.state(motion.state).is_some_and(|state| is_momentum(simulation, state));
+    if momentum || terms.len() < 2 || !matches!(force_path(simulation, motion.derivative), ForcePath::Bare) {
         return None;
     }
     let below: Vec<Vec<Expr>> = terms.iter().map(|(_, term)| Factors::of((*term).clone()).below).collect();
@@ -190,6 +192,9 @@ mod tests {
         assert_eq!(turning(kg), None);
         let inertia = turning(", unit = \"kg m^2\"");
         assert_eq!(inertia.as_deref(), Some("(a/81 - m*k*sin(x) - m*c*v)/m"));
+        // The rate of a momentum is a force already.
+        assert_eq!(equation("a - k*x - c*v/m", kg, ", unit = \"g*mm/ms\""), None);
+        assert_eq!(equation("a - k*x - c*v/m", kg, "").as_deref(), Some("(m*a - m*k*x - c*v)/m"));
     }
 
     #[test]

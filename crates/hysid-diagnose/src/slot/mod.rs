@@ -47,7 +47,7 @@ pub use place::Place;
 pub(crate) use algebra::{is_linear, only_parameters};
 pub(crate) use balance::with_balances;
 pub(crate) use loops::play_of;
-pub(crate) use motion::{ForcePath, force_path};
+pub(crate) use motion::{ForcePath, force_path, is_place};
 pub(crate) use sensed::{Felt, Sensed, sensed};
 pub(crate) use target::{Pull, Rate, Seen, Target};
 pub(crate) use turn::{begins_anywhere, is_turn, with_turns, with_used_turns};

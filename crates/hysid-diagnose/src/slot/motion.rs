@@ -112,6 +112,11 @@ pub(super) fn kinematic(unit: Option<&Unit>, name: &str) -> Kinematic {
     }
 }
 
+/// Whether an input is a displacement by its unit, else by its name.
+pub(crate) fn is_place(simulation: &Simulation, input: &str) -> bool {
+    kinematic(simulation.unit_of(input).as_ref(), input) == Kinematic::Displacement
+}
+
 /// The factor that turns a unit of angle into radians.
 pub(super) fn angle(unit: &Unit) -> Option<Expr> {
     match unit.to_string().as_str() {
@@ -155,7 +160,7 @@ pub(super) fn shown_unit(simulation: &Simulation, state: &str) -> Option<Unit> {
 }
 
 /// Whether a state is the momentum of a part: by its unit, and where it has none by the masses that divide it.
-fn is_momentum(simulation: &Simulation, state: &State) -> bool {
+pub(super) fn is_momentum(simulation: &Simulation, state: &State) -> bool {
     if let Some(unit) = simulation.unit_of(&state.name) {
         return is_one_of(&unit, MOMENTA);
     }
