@@ -155,26 +155,44 @@ impl Finder<'_> {
         told_once && holds(one, x1) && holds(other, x2)
     }
 
-    /// The terms of the force on a part that hold a displacement, each with its sign, also those of a sum that is divided as a whole, which may hold
-    /// several springs.
+    /// The terms of the force on a part that hold a displacement, each with its sign, also those of a sum that is divided or multiplied as a whole, which may
+    /// hold several springs.
     fn terms_with(&self, part: &Motion<'_>, x: &str) -> Vec<(f64, Expr)> {
-        let each = forces_of(self.simulation, part).flat_map(|(sign, term)| match term {
-            Expr::Binary(BinaryOp::Div, sum, by) => {
-                sum.terms().into_iter().map(|(own, t)| (sign * own, t.clone() / (**by).clone())).collect()
-            }
-            _ => vec![(sign, term.clone())],
-        });
+        let each = forces_of(self.simulation, part).flat_map(|(sign, term)| self.spread(sign, term));
         each.filter(|(_, term)| term.uses(x)).collect()
+    }
+
+    /// A term as those of the sum that it is a multiple of: a sum of forces, each with its own stiffness. What a stiffness multiplies, as in `k*(x_1 - x_2)`, is one force.
+    fn spread(&self, sign: f64, term: &Expr) -> Vec<(f64, Expr)> {
+        let constant = |e: &Expr| only_parameters(self.simulation, e);
+        let stiff = |(_, t): (f64, &Expr)| t.symbols().iter().any(|s| self.simulation.parameter(s).is_some());
+        let forces = |sum: &Expr| sum.terms().into_iter().all(stiff);
+        let each = |sum: &Expr, scaled: &dyn Fn(Expr) -> Expr| -> Vec<(f64, Expr)> {
+            let within = sum.terms().into_iter().flat_map(|(own, t)| match t {
+                Expr::Binary(..) if t != sum => self.spread(sign * own, t),
+                _ => vec![(sign * own, t.clone())],
+            });
+            within.map(|(sign, t)| (sign, scaled(t))).collect()
+        };
+        match term {
+            Expr::Binary(BinaryOp::Div, sum, by) => each(sum, &|t| t / (**by).clone()),
+            Expr::Binary(BinaryOp::Mul, by, sum) if constant(by) && forces(sum) => each(sum, &|t| (**by).clone() * t),
+            Expr::Binary(BinaryOp::Mul, sum, by) if constant(by) && forces(sum) => each(sum, &|t| t * (**by).clone()),
+            _ => vec![(sign, term.clone())],
+        }
     }
 
     /// What a deflection pulls with for each unit of it, in each term of the force on a part that is linear in it; `None` where there is none. Another
     /// term may be what a first effect has put there.
     pub(super) fn springs(&self, part: &Motion<'_>, x: &str) -> Option<Vec<Expr>> {
+        let (_, mass) = force_of(self.simulation, part.derivative);
         let all: Vec<Expr> = self
             .terms_with(part, x)
             .into_iter()
             .filter_map(|(sign, term)| {
                 let rate = linear_coefficient(self.simulation, &term, x)?;
+                // A force, also where each term is divided by the mass.
+                let rate = mass.map_or(rate.clone(), |mass| quotient(mass.clone() * rate, Expr::Number(1.0)));
                 Some(if sign < 0.0 { -rate } else { rate })
             })
             .collect();
@@ -184,10 +202,12 @@ impl Finder<'_> {
 
 #[cfg(test)]
 mod tests {
-    use hysid_plant::{Compiled, Drive, Run, Simulation};
+    use std::collections::BTreeMap;
+
+    use hysid_plant::{Compiled, Drive, Expr, Run, Simulation};
 
     use crate::mechanism::conformance::example_signals;
-    use crate::mechanism::{Purpose, mechanism};
+    use crate::mechanism::{Purpose, Signals, mechanism};
     use crate::slot::{Place, Slot, Structure};
 
     /// A frame of two storeys on a table, in their drifts, with these rates of them and this accelerometer on its roof.
@@ -215,6 +235,35 @@ mod tests {
         };
         let parameters: Vec<f64> = simulation.parameters.iter().map(|p| value(&p.name)).collect();
         Compiled::new(simulation).unwrap().simulate(&Run::new(&drive, &parameters)).outputs
+    }
+
+    /// A mass on isolators under another one, in frequencies: what the isolators put on the ground acts back on both by the masses' shares.
+    #[test]
+    fn a_spring_that_is_told_by_a_frequency_pulls_at_both_masses() {
+        let (isolators, storey) = ("((2*pi*k1)^2*d1 + 4*pi*k1*c1*v1)", "(2*pi*k2)^2*d2 + 4*pi*k2*c2*v2");
+        let first = format!("-ag - {isolators} + m1/(1 - m1)*({storey}) - m1/(1 - m1)*{isolators}");
+        for second in [
+            format!("(1/(1 - m1))*({isolators} - ({storey}))"),
+            "(1/(1 - m1))*((2*pi*k1)^2*d1 + 4*pi*k1*c1*v1 - (2*pi*k2)^2*d2 - 4*pi*k2*c2*v2)".to_owned(),
+            format!("({isolators} - ({storey}))/(1 - m1)"),
+        ] {
+            let slots = Structure::of(&frame([&first, &second, "d2"], &[])).slots;
+            let slot = slots.into_iter().find(|s| s.place == Place::Connection && s.label == "state:v1").unwrap();
+            let plain = frame([&first, &second, "d2"], &[]);
+            let law = mechanism("cubic_stiffness").unwrap();
+            let written =
+                law.rewrite(&plain, &slot, &example_signals(&plain, &slot), Purpose::Refit).unwrap().simulation;
+            let cubic = |by: f64, of: &str| {
+                let e = &written.state(of).unwrap().derivative;
+                let values = [("m1", 0.5), ("d1", 0.1), ("k1", 1.0), ("k_3", by), ("pi", 1.0)];
+                let rest = ["ag", "c1", "v1", "k2", "d2", "c2", "v2"].map(|s| (s, 0.0));
+                let at = values.iter().chain(&rest).fold(e.clone(), |e, (s, v)| e.substitute(s, &Expr::Number(*v)));
+                Signals::new(0.01, 0.0, BTreeMap::new()).size_of(&at).unwrap()
+            };
+            let pull = |of: &str| cubic(1.0, of) - cubic(0.0, of);
+            let (one, two) = (pull("v1"), pull("v2"));
+            assert!(one < 0.0 && (one + two).abs() < 1e-9 * two, "{second}: {one} {two}");
+        }
     }
 
     #[test]
