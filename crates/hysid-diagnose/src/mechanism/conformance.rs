@@ -3,6 +3,8 @@
 mod derivatives;
 mod motion;
 mod recovery;
+#[cfg(test)]
+mod screened;
 
 use std::collections::BTreeMap;
 

@@ -11,12 +11,14 @@ use crate::slot::{Slot, Target};
 
 /// Most points of the shape grid that a fit is tried from.
 const MOST_POINTS: usize = 48;
+/// Size of the effect relative to the outputs.
+const VISIBLE: f64 = 0.1;
 /// Fits from the best points.
 const FITS: usize = 5;
 
 /// What a simulation with the mechanism in it gives.
-struct Truth {
-    outputs: Vec<Vec<f64>>,
+pub(super) struct Truth {
+    pub outputs: Vec<Vec<f64>>,
     /// Its difference from the baseline, relative to the outputs.
     effect: f64,
 }
@@ -27,7 +29,7 @@ impl Bench {
     /// effect makes no difference here.
     pub fn recovery(&self, mechanism: &'static Mechanism, slot: &Slot, signals: &Signals) -> Option<f64> {
         let written = mechanism.rewrite(&self.simulation, slot, signals, Purpose::Refit).ok()?;
-        let truth = self.truth(&written)?;
+        let truth = self.truth(&written, VISIBLE)?;
         // What can be read off the recording now: the peaks of the residual, the steps of the output.
         let mut seen = signals.clone();
         seen.peaks_hz = self.peaks_hz(&truth.outputs);
@@ -118,11 +120,12 @@ impl Bench {
     }
 
     /// The response at a point off the grid, between two neighbours; of a few such points and amplitudes the one whose effect
-    /// is nearest to a tenth of the output.
-    fn truth(&self, written: &Rewritten) -> Option<Truth> {
+    /// is nearest to this share of the outputs.
+    pub(super) fn truth(&self, written: &Rewritten, size: f64) -> Option<Truth> {
         let starts = written.starts();
-        let shares: &[f64] = if written.amplitudes.is_empty() { &[0.0] } else { &[0.15, 0.05, 0.015, 0.4] };
-        let off = |effect: f64| (effect / 0.1).ln().abs();
+        let shares: &[f64] =
+            if written.amplitudes.is_empty() { &[0.0] } else { &[0.15, 0.05, 0.015, 0.4, 0.003, 6e-4, 1e-4] };
+        let off = |effect: f64| (effect / size).ln().abs();
         let mut best: Option<Truth> = None;
         for at in [starts.len() / 2, starts.len() / 4, 3 * starts.len() / 4] {
             let (one, two) = (starts.get(at)?, starts.get((at + 1).min(starts.len() - 1))?);
@@ -146,18 +149,19 @@ impl Bench {
 }
 
 /// The fit of a simulation to the outputs of another.
-struct SelfRecord<'a> {
+pub(super) struct SelfRecord<'a> {
     compiled: &'a Compiled,
     drive: &'a Drive,
     target: &'a [Vec<f64>],
-    fitted: Vec<usize>,
+    /// Places of the parameters that are fitted.
+    pub fitted: Vec<usize>,
     bounds: Vec<(f64, f64)>,
-    layout: Layout,
-    whitener: Whitener,
+    pub layout: Layout,
+    pub whitener: Whitener,
 }
 
 impl<'a> SelfRecord<'a> {
-    fn new(compiled: &'a Compiled, drive: &'a Drive, target: &'a [Vec<f64>]) -> Self {
+    pub fn new(compiled: &'a Compiled, drive: &'a Drive, target: &'a [Vec<f64>]) -> Self {
         let fitted = compiled.estimated();
         let bounds =
             fitted.iter().filter_map(|i| compiled.parameters().get(*i)).map(|p| (p.lower(), p.upper())).collect();
@@ -167,6 +171,12 @@ impl<'a> SelfRecord<'a> {
         let sizes = target.iter().map(|y| rms(y.iter().copied()).max(f64::MIN_POSITIVE));
         let whitener = Whitener::of(sizes.map(NoiseModel::white).collect());
         Self { compiled, drive, target, fitted, bounds, layout, whitener }
+    }
+
+    /// The values that the simulation states of what is fitted.
+    pub fn values(&self) -> Vec<f64> {
+        let theta = self.compiled.theta();
+        self.fitted.iter().filter_map(|i| theta.get(*i)).copied().collect()
     }
 
     fn theta(&self, values: &[f64]) -> Vec<f64> {
