@@ -129,3 +129,27 @@ fn a_simulation_that_follows_nothing_is_told_so() {
     assert!(of(&lost).contains("does not follow the recording") && of(&lost).contains("Do not keep this simulation"));
     assert!(!of(&picture()).contains("does not follow the recording"));
 }
+
+#[test]
+fn what_the_hold_out_refutes_is_not_recommended() {
+    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
+    let of = |ratio: f64| {
+        let mut file = file(VerdictKind::Named);
+        file.fit.push(FitRecord {
+            recording: "val.csv".into(),
+            output: "q_m".into(),
+            rmse_before: Some(1.0),
+            rmse_after: Some(ratio),
+            ratio: Some(ratio),
+            ratio_low: Some(0.9 * ratio),
+            ratio_high: Some(1.1 * ratio),
+            rmse_black_box: None,
+        });
+        page(&file, &picture(), &provenance)
+    };
+    let (worse, better) = (of(1.5), of(0.5));
+    for part in ["the hold-out does not bear it out", "Do not use augmented.sim.toml"] {
+        assert!(worse.contains(part) && !better.contains(part), "{part}");
+    }
+    assert!(better.contains("Use augmented.sim.toml") && !worse.contains("Use augmented.sim.toml"));
+}

@@ -8,17 +8,23 @@ pub(super) fn plain(identifier: &str) -> String {
     identifier.replace('_', " ")
 }
 
+/// Whether the augmented simulation is worse on the hold-out than the simulation as it is.
+fn is_refuted(file: &DiagnosisFile) -> bool {
+    file.fit.iter().any(|f| f.refuted().is_some())
+}
+
 /// The verdict as a headline.
 pub(super) fn headline(file: &DiagnosisFile, picture: &Picture) -> String {
     let mechanisms: Vec<String> = file.effects.iter().map(|e| plain(&e.mechanism)).collect();
     let families: Vec<String> = file.effects.iter().map(|e| plain(&e.family)).collect();
+    let refuted = if is_refuted(file) { ", by this recording; the hold-out does not bear it out" } else { "" };
     match file.verdict {
         VerdictKind::NoSignificantMismatch if !picture.unexplained().is_empty() => {
             "The simulation does not follow the recording, and nothing tells what is missing".into()
         }
         VerdictKind::NoSignificantMismatch => "No significant mismatch".into(),
-        VerdictKind::Named => format!("Missing: {}", mechanisms.join(" and ")),
-        VerdictKind::Family => format!("Missing: something of the family {}", families.join(" and ")),
+        VerdictKind::Named => format!("Missing: {}{refuted}", mechanisms.join(" and ")),
+        VerdictKind::Family => format!("Missing: something of the family {}{refuted}", families.join(" and ")),
         VerdictKind::Ambiguous => "Something is missing, and this recording cannot tell what".into(),
         VerdictKind::NotInCatalogue => "Something is missing that the catalogue does not hold".into(),
     }
@@ -57,6 +63,9 @@ pub(super) fn next_step(file: &DiagnosisFile, picture: &Picture) -> &'static str
         }
         VerdictKind::NoSignificantMismatch => {
             "Nothing needs to be added: keep the simulation with the recalibrated parameters below. An effect can still be hidden where it is smaller than the recording would have shown; see the table."
+        }
+        _ if is_refuted(file) => {
+            "Do not use augmented.sim.toml beyond the recordings that it was fitted to: on the hold-out it is worse than the simulation as it is. Look at the residual there, and whether what is missing acts in both recordings."
         }
         VerdictKind::Named => {
             "Use augmented.sim.toml: it is the simulation with the effect in it, calibrated. Check that its parameters are plausible for your machine."
