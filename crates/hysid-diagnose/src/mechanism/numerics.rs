@@ -71,7 +71,10 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
     if late.validate().is_ok() {
         found.push(Variant { what: "outputs half a sample late", simulation: late });
     }
-    let whole = explicit(simulation, Expr::Number(period_s));
+    // Of an input such a step sees one value.
+    let mut in_steps = simulation.clone();
+    in_steps.time.hold = Hold::Zero;
+    let whole = explicit(&in_steps, Expr::Number(period_s));
     found.extend(whole.map(|simulation| Variant { what: EXPLICIT, simulation }));
     found.extend(shorter(simulation, period_s).map(|simulation| Variant { what: SHORTER, simulation }));
     let slots = Structure::of(simulation).slots;
@@ -116,7 +119,6 @@ fn explicit(simulation: &Simulation, step: Expr) -> Option<Simulation> {
         _ => e,
     };
     let mut other = simulation.clone();
-    other.time.hold = Hold::Zero;
     other.states.iter_mut().for_each(|s| s.derivative = s.derivative.map(&mut |e| earlier(e)));
     other.validate().is_ok().then_some(other)
 }
