@@ -13,6 +13,7 @@ use crate::data::glitches::{mended, told};
 use crate::data::intake::{Intake, intake};
 use crate::error::DiagnoseError;
 use crate::evidence::NoiseModel;
+use crate::experiment::astray::astray;
 use crate::experiment::fresh::gamble;
 use crate::experiment::separating;
 use crate::file::*;
@@ -321,12 +322,21 @@ fn written<'d>(
     }
     let modelled = if file.verdict == VerdictKind::NotInCatalogue {
         (hooks.progress)("writing the correction into the simulation");
-        judged.rest.modelled(search, pool, winner, winner == 0 || believed, set)
+        // On top of what is not written nothing is.
+        let trusted = winner == 0 || (believed && steady == winner);
+        judged.rest.modelled(search, pool, winner, trusted, set)
     } else {
         None
     };
+    let leads_astray = |h: &Hypothesis<'_>| astray(&search.setting, &pool[0].base, &h.base);
+    let (modelled, strayed) = match modelled {
+        Some(h) if leads_astray(&h) => (None, true),
+        other => (other, false),
+    };
     let note = if modelled.is_some() {
         "the augmented simulation holds the sparse correction, refitted, and no physics that has a name: it predicts blocks of the recordings that it was not fitted to better, and says nothing outside their range"
+    } else if strayed {
+        "on the recorded inputs mirrored, reversed in time or doubled the sparse correction leads far from the simulation as it is, or runs away: it is told, and not written"
     } else if judged.rest.spectrum {
         "several relaxations stand beside each other: a memory with many time scales (a fractional element, a spectrum of relaxation times), which the catalogue does not have; within the band of the recording their sum follows it"
     } else if judged.rest.foreign && unfinished {

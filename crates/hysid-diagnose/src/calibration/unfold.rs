@@ -46,7 +46,7 @@ fn unfold(sizes: &[f64]) -> Vec<f64> {
 pub fn calibrated_unfolded(original: &Simulation, rectified: &Simulation, data: &DataSet) -> Option<Simulation> {
     let folded = |s: &Simulation, i: usize| matches!(s.outputs[i].expression, Expr::Call(Function::Abs, _));
     let output = (0..rectified.outputs.len()).find(|&i| folded(rectified, i) && !folded(original, i))?;
-    let stretch = data.stretches.iter().max_by_key(|s| s.len())?;
+    let stretch = &data.stretches[data.longest()?];
     let sizes = stretch.outputs.get(output)?;
     if sizes.len() < 3 || sizes.iter().any(|v| !v.is_finite()) {
         return None;

@@ -119,6 +119,11 @@ impl DataSet {
         Self::from_stretches(period_s, vec![String::new()], vec![stretch], count, Vec::new(), 1)
     }
 
+    /// The place of the longest stretch.
+    pub fn longest(&self) -> Option<usize> {
+        (0..self.stretches.len()).max_by_key(|&at| self.stretches[at].len())
+    }
+
     /// Number of samples to simulate.
     pub fn samples(&self) -> usize {
         self.stretches.iter().map(Stretch::len).sum()

@@ -39,7 +39,7 @@ const SHARE: f64 = 0.5;
 const STILL: f64 = 1.5;
 const HALVINGS: i32 = 6;
 
-/// The fitted simulation as it starts anew: where the document says, free states at zero.
+/// The fitted simulation as it starts anew: where the document says, free states where they were found at the start of the longest recording.
 pub fn started(base: &Base<'_>) -> Simulation {
     started_at(base, &base.fit.theta)
 }
@@ -47,7 +47,11 @@ pub fn started(base: &Base<'_>) -> Simulation {
 /// The same with other values of its unknowns.
 fn started_at(base: &Base<'_>, theta: &[f64]) -> Simulation {
     let mut document = base.model.document(theta);
-    document.states.iter_mut().filter(|s| s.initial == Initial::Free).for_each(|s| s.initial = Initial::Number(0.0));
+    let (longest, found) = (base.model.data().longest(), base.model.values(theta).initials);
+    for state in document.states.iter_mut().filter(|s| s.initial == Initial::Free) {
+        let start = longest.and_then(|at| found.get(&(at, state.name.clone())).copied());
+        state.initial = Initial::Number(start.unwrap_or(0.0));
+    }
     document
 }
 
@@ -99,7 +103,7 @@ pub fn answered(document: &Simulation, drive: &Drive, substeps: usize) -> Option
 }
 
 /// The squared distance of two answers to one input after the run-in, each output in units of its noise.
-fn apart(a: &DataSet, b: &DataSet, noise: &[f64]) -> f64 {
+pub(super) fn apart(a: &DataSet, b: &DataSet, noise: &[f64]) -> f64 {
     let outputs = a.stretches[0].outputs.iter().zip(&b.stretches[0].outputs).zip(noise);
     let squares = outputs.map(|((a, b), noise)| {
         a.iter().zip(b).skip(a.len() / RUN_IN).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / noise.powi(2)
@@ -141,7 +145,6 @@ fn expected_share(
 /// The expected share of the loss that the winner has where it is too large for the winner to be written: that would be a gamble.
 pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
     let Contest { pool, probability, winner, .. } = *contest;
-    let recorded = &setting.data.stretches.iter().max_by_key(|s| s.len())?.drive;
     let likely = |&i: &usize| i != winner && probability[i] > LIKELY && !pool[i].effects.is_empty();
     // What a law that is nearly right leaves of itself is no truth, and goes anywhere on a larger input: with it a set says what it says without.
     let (same, mut rivals): (Vec<usize>, Vec<usize>) =
@@ -161,16 +164,24 @@ pub fn gamble(setting: &Setting<'_>, contest: &Contest<'_, '_>) -> Option<f64> {
     }
     let (nothing, best) = (started(&pool[0].base), started(&pool[winner].base));
     let noise: Vec<f64> = pool[winner].base.whitener.models.iter().map(|m| m.noise_rms()).collect();
-    let changes: [fn(&[f64]) -> Vec<f64>; 3] = [mirror_image, reversed, doubled];
-    changes
+    [mirror_image, reversed, doubled]
         .into_iter()
-        .filter_map(|change| {
-            let inputs = recorded.inputs().iter().map(|u| faded(u, &change(u))).collect();
-            let drive = Drive::new(recorded.start_s(), recorded.period_s(), recorded.len(), inputs).ok()?;
+        .filter_map(|change: Change| {
+            let drive = changed(setting.data, change)?;
             expected_share(&nothing, (own, &best), &rivals, &drive, setting.substeps, &noise)
         })
         .max_by(f64::total_cmp)
         .filter(|loss| *loss > WORTH)
+}
+
+/// What makes another input of a recorded one.
+pub(super) type Change = fn(&[f64]) -> Vec<f64>;
+
+/// The input of the longest recording with this change, which it fades into; `None` where there is none.
+pub(super) fn changed(data: &DataSet, change: Change) -> Option<Drive> {
+    let recorded = &data.stretches[data.longest()?].drive;
+    let inputs = recorded.inputs().iter().map(|u| faded(u, &change(u))).collect();
+    Drive::new(recorded.start_s(), recorded.period_s(), recorded.len(), inputs).ok()
 }
 
 /// The first series, which gives way to the second over the first half of the run-in: a start is as it was recorded.
@@ -181,17 +192,17 @@ fn faded(from: &[f64], to: &[f64]) -> Vec<f64> {
 }
 
 /// A series from its end to its beginning.
-fn reversed(u: &[f64]) -> Vec<f64> {
+pub(super) fn reversed(u: &[f64]) -> Vec<f64> {
     u.iter().rev().copied().collect()
 }
 
 /// A series mirrored about the middle of its range.
-fn mirror_image(u: &[f64]) -> Vec<f64> {
+pub(super) fn mirror_image(u: &[f64]) -> Vec<f64> {
     about_the_middle(u, -1.0)
 }
 
 /// A series twice as far from the middle of its range.
-fn doubled(u: &[f64]) -> Vec<f64> {
+pub(super) fn doubled(u: &[f64]) -> Vec<f64> {
     about_the_middle(u, 2.0)
 }
 
@@ -203,11 +214,11 @@ fn about_the_middle(u: &[f64], times: f64) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A drive that nothing holds, pushed one way first, with this damping and a further force.
-    fn drive(damping: f64, force: &str) -> Simulation {
+    pub(in crate::experiment) fn drive(damping: f64, force: &str) -> Simulation {
         let text = format!(
             "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_N\"\n[parameters]\nb = {{ value = {damping}, min = 0.0, max = 9.0 }}\n\
              [states]\nq = {{ derivative = \"w\", initial = 0.0 }}\nw = {{ derivative = \"u - b*w{force}\", initial = 0.0 }}\n\

@@ -7,6 +7,7 @@
 //!
 //! Reference: W. G. Hunter and A. M. Reiner, Designs for discriminating between two rival models, Technometrics 7 (1965) 307-323.
 
+pub mod astray;
 pub mod fresh;
 
 use hysid_plant::{Drive, Simulation};
@@ -88,7 +89,8 @@ struct Trial {
 
 /// The inputs of the library at row `row` of the levels.
 fn library(setting: &Setting<'_>, seed: u64, row: usize) -> Vec<Trial> {
-    let Some(stretch) = setting.data.stretches.iter().max_by_key(|s| s.len()) else { return Vec::new() };
+    let Some(longest) = setting.data.longest() else { return Vec::new() };
+    let stretch = &setting.data.stretches[longest];
     let n = stretch.len().min(LONGEST);
     let period = stretch.drive.period_s();
     let inputs = stretch.drive.inputs();

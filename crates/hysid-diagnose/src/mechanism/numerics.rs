@@ -103,17 +103,20 @@ pub fn variants(simulation: &Simulation, period_s: f64) -> Vec<Variant> {
     found
 }
 
-/// The differential equation that explicit steps of this length follow but for terms of their square, `x' = f(x - h/2 f(x, u), u)` with held inputs; `None`
-/// where there is no state, or a memory that knows nothing of steps.
+/// The differential equation that explicit steps of this length follow but for terms of their square, `x' = f(x - h/2 f(x, u), u)`, where inputs go on between
+/// samples with `u - h/2 u'` in their place; `None` where there is no state, or a memory that knows nothing of steps.
 ///
 /// Reference: E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed. (2006), sec. IX.1 (modified equations).
 fn explicit(simulation: &Simulation, step: Expr) -> Option<Simulation> {
     if simulation.is_static() || simulation.states.iter().any(|s| s.derivative.has_memory()) {
         return None;
     }
+    let half = step / Expr::Number(2.0);
+    let goes_on = simulation.time.hold == Hold::Linear;
     let earlier = |e: Expr| match &e {
         Expr::Symbol(name) => match simulation.state(name) {
-            Some(state) => e - step.clone() / Expr::Number(2.0) * state.derivative.clone(),
+            Some(state) => e - half.clone() * state.derivative.clone(),
+            None if goes_on && simulation.input(name).is_some() => e.clone() - half.clone() * e.derivative_of_input(),
             None => e,
         },
         _ => e,

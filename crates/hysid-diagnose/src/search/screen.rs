@@ -127,7 +127,7 @@ fn signals(
         stretches.push(from..from + s.len());
         from += s.len();
     }
-    let start_s = data.stretches.iter().max_by_key(|s| s.len()).map_or(0.0, |s| s.start_s);
+    let start_s = data.longest().map_or(0.0, |at| data.stretches[at].start_s);
     structure
         .slots
         .iter()

@@ -174,6 +174,7 @@ impl<'a> SelfRecord<'a> {
     }
 
     /// The values that the simulation states of what is fitted.
+    #[cfg(test)]
     pub fn values(&self) -> Vec<f64> {
         let theta = self.compiled.theta();
         self.fitted.iter().filter_map(|i| theta.get(*i)).copied().collect()
