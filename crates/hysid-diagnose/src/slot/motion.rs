@@ -131,15 +131,24 @@ pub(super) fn angle(unit: &Unit) -> Option<Expr> {
 /// Units of what a capacitor has.
 pub(super) const CHARGED: &[&str] = &["C", "V"];
 
+/// Units of what a spring pulls with.
+const FORCES: &[&str] = &["N", "N m"];
+
 /// The constant by which a state's derivative is a multiple of a velocity, where the state is a displacement by its unit or name, a capacitor that
-/// a current charges, or one of two states without dimension that acts back on the other, as in equations that are made dimensionless.
+/// a current charges, the force of a spring that the velocity winds up and that acts back on it, or one of two states without dimension of which the same is
+/// true, as in equations that are made dimensionless.
 fn scale(simulation: &Simulation, position: &State, velocity: &State) -> Option<Expr> {
     let unit = || shown_unit(simulation, &position.name);
     let charged = || has_unit(simulation.unit_of(&velocity.name), &["A"]) && has_unit(unit(), CHARGED);
     let bare = |unit: Option<Unit>| unit.is_none_or(|u| u.is_none());
-    let restored =
-        || bare(unit()) && bare(shown_unit(simulation, &velocity.name)) && velocity.derivative.uses(&position.name);
-    let moved = kinematic(unit().as_ref(), &position.name) == Kinematic::Displacement || charged() || restored();
+    let driving = || shown_unit(simulation, &velocity.name);
+    let wound = || {
+        has_unit(unit(), FORCES) && kinematic(driving().as_ref(), &velocity.name) == Kinematic::Velocity
+            || bare(unit()) && bare(driving())
+    };
+    let moved = kinematic(unit().as_ref(), &position.name) == Kinematic::Displacement
+        || charged()
+        || velocity.derivative.uses(&position.name) && wound();
     if signals_in(simulation, &position.derivative).any(|s| s != velocity.name) || !moved {
         return None;
     }
@@ -239,6 +248,21 @@ mod tests {
         assert!(found("-", "w*s", "u - s/50").is_empty(), "a sum of what a lag shows");
         assert!(found("-", "w*(s - y)", "u - s/50 - y").is_empty(), "a second lag");
         assert!(found("mol/l", "w*s", "u - s/50 - y").is_empty());
+    }
+
+    #[test]
+    fn the_force_of_a_spring_is_a_displacement_to_its_mass() {
+        let found = |force: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nF = \"rod_kN\"\n[parameters]\nk = {{ value = 150.0, min = 1.0, unit = \"kN/m\" }}\nm = {{ value = 190.0, min = 1.0, unit = \"kg\" }}\n\
+                 [states]\nf = {{ derivative = \"k*v\", initial = 0.0, unit = \"kN\" }}\n\
+                 v = {{ derivative = \"1000*({force})/m\", initial = 0.0, unit = \"m/s\" }}\n[outputs]\nvel_mm_s = \"1000*v\"\n"
+            );
+            let simulation = Simulation::parse(&text, "bush.sim.toml").unwrap();
+            motions(&simulation, &simulation).iter().map(|m| m.x.map(str::to_owned)).collect::<Vec<_>>()
+        };
+        assert_eq!(found("F - f"), [Some("f".to_owned())]);
+        assert_eq!(found("F"), [None], "it pulls at nothing");
     }
 
     #[test]
