@@ -118,7 +118,9 @@ impl Mechanism {
     pub fn block_at(&self, slot: &Slot) -> Block {
         match (slot.place, self.block) {
             (_, Block::TimeVariation | Block::Disturbance) => self.block,
-            (Place::Input | Place::Prescribed | Place::Between | Place::Command | Place::Plays, _) => Block::Input,
+            (Place::Input | Place::Prescribed | Place::Between | Place::Command | Place::Winding | Place::Plays, _) => {
+                Block::Input
+            }
             (Place::Sensor, _) => Block::Output,
             _ => self.block,
         }

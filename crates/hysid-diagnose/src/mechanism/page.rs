@@ -52,6 +52,7 @@ fn place_name(place: Place) -> &'static str {
         Place::Prescribed => "prescribed motion",
         Place::Between => "inside a cascade",
         Place::Command => "command of a controller",
+        Place::Winding => "winding",
         Place::Force => "force on a moving part",
         Place::Connection => "force between two parts",
         Place::ForceLaw => "static force law",

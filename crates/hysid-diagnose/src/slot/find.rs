@@ -174,9 +174,6 @@ impl Finder<'_> {
             let driven = self.motions.iter().find(|m| m.derivative.uses(symbol));
             if let Some(motion) = driven {
                 self.offer_motion(&mut slot, motion);
-            } else if let Some((current, motion)) = self.winding(symbol) {
-                slot.offer(self.simulation, "i", Expr::symbol(current));
-                slot.offer(self.simulation, "v", Expr::symbol(motion.v));
             }
             // A constant that is free takes up an offset where it stands beside the input wherever that enters.
             let states =
@@ -185,8 +182,26 @@ impl Finder<'_> {
             let mut entered = states.chain(outputs).filter(|(whole, _)| whole.uses(symbol)).peekable();
             slot.constant = entered.peek().is_some() && entered.all(|(_, sum)| has_free_constant(self.simulation, sum));
             slots.push(slot);
+            slots.extend(self.wound(symbol));
         }
         slots
+    }
+
+    /// The winding that an input feeds.
+    fn wound(&self, input: &str) -> Option<Slot> {
+        let (current, motion) = self.winding(input)?;
+        let driven = vec![current.to_owned()];
+        let mut slot = Slot::new(
+            Place::Winding,
+            format!("state:{current}"),
+            format!("in the winding of {current}"),
+            Target::SymbolIn(input.to_owned(), driven.clone(), None),
+        );
+        slot.offer(self.simulation, "u", Expr::symbol(input));
+        slot.offer(self.simulation, "i", Expr::symbol(current));
+        slot.offer(self.simulation, "v", Expr::symbol(motion.v));
+        slot.context = self.derivatives_of(&driven);
+        Some(slot)
     }
 
     /// Offers the velocity of a part and, where it has one, its displacement.

@@ -11,6 +11,8 @@ pub enum Place {
     Between,
     /// What a controller inside the simulation puts out.
     Command,
+    /// A winding that an input feeds, whose current is a state: what is induced there.
+    Winding,
     /// The force on a moving part, against the ground.
     Force,
     /// The force between two moving parts.

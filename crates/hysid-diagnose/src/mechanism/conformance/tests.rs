@@ -215,14 +215,14 @@ fn what_is_held_or_wound_beside_a_motion_is_found() {
     };
     assert_eq!(stands("leakage", "cylinder"), ["state:p"]);
     assert!(stands("leakage", "shaker").is_empty() && stands("leakage", "oscillator").is_empty());
-    assert_eq!(stands("back_emf", "shaker"), ["input:u"]);
+    assert_eq!(stands("back_emf", "shaker"), ["state:i"]);
     // What is wound lacks the induced voltage alone.
     let shaker = specimen("shaker");
-    let slot = Structure::of(&shaker).slots.into_iter().find(|s| s.label == "input:u").unwrap();
+    let slot = Structure::of(&shaker).slots.into_iter().find(|s| s.place == Place::Winding).unwrap();
     assert_eq!(slot.quantity("i").unwrap().expression.to_string(), "i");
     let mut induced = shaker;
     induced.state_mut("i").unwrap().derivative = hysid_plant::Expr::parse("(u - R*i - k_F*v)/L").unwrap();
-    assert!(!Structure::of(&induced).slots.iter().any(|s| s.label == "input:u" && s.has("i")));
+    assert!(!Structure::of(&induced).slots.iter().any(|s| s.place == Place::Winding && s.has("i")));
 }
 
 /// Heat that follows within a period of the motion is told from there on, in seconds.

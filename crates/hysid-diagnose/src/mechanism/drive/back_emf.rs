@@ -17,7 +17,7 @@ pub static BACK_EMF: Mechanism = Mechanism {
     id: "back_emf",
     family: Family::Electrical,
     block: Block::Input,
-    places: &[Place::Input, Place::Command],
+    places: &[Place::Input, Place::Command, Place::Winding],
     applies: |slot| slot.has("v") && slot.quantity("u").and_then(|u| u.unit.as_ref()).is_none_or(feeds),
     already: &["lag(u - P*v, Q)"],
     law: |slot, purpose| match purpose {
@@ -81,7 +81,7 @@ mod tests {
                  v = {{ derivative = \"K*s - 9*v - 500*x\", initial = 0.0, unit = \"m/s\" }}\n[outputs]\npos_m = \"x\"\n"
             );
             let structure = Structure::of(&Simulation::parse(&text, "solenoid.sim.toml").unwrap());
-            BACK_EMF.slots(&structure).iter().any(|s| s.label == "input:e" && s.has("i"))
+            BACK_EMF.slots(&structure).iter().any(|s| s.label == "state:s" && s.has("i"))
         };
         assert!(wound("A") && wound("V s") && wound("Wb"));
         assert!(!wound("K"));
