@@ -36,6 +36,13 @@ pub struct Variant {
     pub simulation: Simulation,
 }
 
+impl Variant {
+    /// Log odds against it, which its evidence has to pay for.
+    pub fn odds_against(&self) -> f64 {
+        if self.what == SHORTER { UNSTATED } else { 0.0 }
+    }
+}
+
 /// The place of a smoothed friction law taken by one that sticks.
 const STICKS: &str = "friction that sticks in the place of a smoothed law";
 /// A smoothed friction law made sharper, which can be done again.
@@ -45,6 +52,8 @@ pub const SHARPER: &str = "smoothed friction three times as sharp";
 const EXPLICIT: &str = "explicit steps of a sampling period, as a machine that is emulated takes them";
 /// The same with shorter steps, of a length that is fitted.
 const SHORTER: &str = "explicit steps of a part of a sampling period, as a machine that is emulated takes them";
+/// Log odds against an emulated machine whose steps have a length that nobody states: what lags a little fits it, too.
+const UNSTATED: f64 = 5.0;
 /// Share of the sampling period from which the length of such steps is fitted.
 const FIRST_SHARE: f64 = 0.25;
 
