@@ -30,6 +30,8 @@ const LEAST: f64 = 1e-3;
 /// Moments between the ends of a recording at which it is asked whether one says as much as another, and the log likelihood within which it does.
 const MOMENTS: usize = 200;
 const AS_GOOD: f64 = 0.05;
+/// Samples on either side of a moment at which it is asked whether it could as well have been there.
+const BESIDE: usize = 24;
 /// Halvings of the way to a bound that are looked at, and cuts of the one in which the interval ends, each into so many parts.
 const HALVINGS: i32 = 24;
 const CUTS: usize = 3;
@@ -79,7 +81,7 @@ pub fn take_intervals(h: &mut Hypothesis<'_>) {
 }
 
 /// Where the profile of the error has risen by what one unknown does with a probability of 5 %, on either side of where the shape stands; the bound where it does
-/// not rise so far.
+/// not rise so far. A moment may as well have been on the other side of one that it cannot have been at: as a machine slows down, and as it speeds up again.
 fn interval(base: &Base<'_>, shape: &Shape) -> Option<[f64; 2]> {
     let error = Profile::of(base, shape)?;
     let here = error.here;
@@ -103,7 +105,10 @@ fn interval(base: &Base<'_>, shape: &Shape) -> Option<[f64; 2]> {
         }
         place(0.5 * (inside + outside))
     };
-    Some([side(error.bounds.0), side(error.bounds.1)])
+    let [low, high] = [side(error.bounds.0), side(error.bounds.1)];
+    let beside = if shape.places == Places::Moments { BESIDE } else { 0 };
+    let others = error.around(here, base.model.data().period_s, beside).into_iter().filter(|at| at.1 <= within);
+    Some(others.fold([low, high], |[low, high], (at, _)| [low.min(at), high.max(at)]))
 }
 
 /// The fit with a moment in that middle, where that is more than a step: while the machine stands still nothing
@@ -345,5 +350,39 @@ mod tests {
         assert!(low < changes && changes < high, "{low} to {high}");
         let off = |a: f64, b: Option<&f64>| (a - b.unwrap()).abs();
         assert!(off(low, all.first()).max(off(high, all.last())) < PERIOD, "{low} to {high}, {all:?}");
+    }
+
+    /// What a brake that gives way takes off the speed of a drive adds up to how far the drive has come: it may have given way there on the way out as well as on
+    /// the way back, and not where it turned.
+    #[test]
+    fn a_moment_may_lie_on_either_side_of_a_turning_point() {
+        let text = "[time]\ncolumn = \"t_s\"\n[inputs]\nu = \"u_N\"\n[parameters]\nb = { value = 1.0, min = 0.1, max = 9.0 }\n[states]\n\
+                    x = { derivative = \"w\", initial = 0.0 }\nw = { derivative = \"u - b*w\", initial = 0.0 }\n[outputs]\nx_m = \"x\"\n";
+        let original = Simulation::parse(text, "drive.sim.toml").unwrap();
+        let (period, n) = (0.1, 1000);
+        let u: Vec<f64> = (0..n).map(|i| (0.25 * f64::from(i) * period).sin()).collect();
+        let changed = original.to_toml().replace("u - b*w", "u - b*(1 + 0.04*step(t - 37.7))*w");
+        let changed = hysid_plant::Compiled::new(&Simulation::parse(&changed, "changed.sim.toml").unwrap()).unwrap();
+        let drive = hysid_plant::Drive::new(0.0, period, u.len(), vec![u.clone()]).unwrap();
+        let mut y = changed.simulate(&hysid_plant::Run::new(&drive, &changed.theta())).outputs.swap_remove(0);
+        let mut random = normal(3);
+        y.iter_mut().for_each(|y| *y += 0.03 * random());
+        let data = recorded(&original, period, [("u_N", u), ("x_m", y)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let at_b = |m: &crate::mechanism::Mechanism, s: &crate::slot::Slot| {
+            m.id == "abrupt_change" && s.label == "parameter:b"
+        };
+        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &at_b);
+        let mut h = refit(&setting, &none, &found[0]).unwrap();
+        take_intervals(&mut h);
+        let shape = h.effects[0].moments().next().unwrap();
+        let profile = Profile::of(&h.base, shape).unwrap();
+        let within = profile.at(&[profile.here])[0] + QUANTILE.powi(2) * h.base.variance();
+        let around = profile.around(profile.here, period, BESIDE);
+        let told = h.base.intervals().into_iter().find(|i| i.name == shape.name).unwrap().ends.unwrap();
+        let refuted = |at: &&(f64, f64)| told[0] < at.0 && at.0 < told[1] && at.1 > within;
+        assert!(around.iter().any(|at| refuted(&at)), "one stretch of moments");
+        assert!(around.iter().all(|(t, e)| *e > within || (told[0]..=told[1]).contains(t)));
     }
 }
