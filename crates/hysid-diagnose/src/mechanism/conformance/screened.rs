@@ -51,7 +51,7 @@ impl Bench {
                 let mut columns: Vec<Vec<f64>> = own.iter().map(|&k| whitened(&tangents[k])).collect();
                 columns.extend(group.iter().map(|&k| whitened(&tangents[k])));
                 let mut left = whitened(&residual);
-                Projector::new(columns.into_iter()).remove(&mut left);
+                Projector::new(columns).remove(&mut left);
                 let share = 1.0 - norm2(&left) / before;
                 best = Some(best.map_or(share, |b: f64| b.max(share)));
             }
