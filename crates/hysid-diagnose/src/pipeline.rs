@@ -156,7 +156,7 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let rate = file.correction.as_ref().and_then(|c| told_rate(&c.loudest()?.term));
     let varying = rate.or(varying).or(wanders);
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
-    if let Some(refutation) = refutation(&file) {
+    if let Some(refutation) = refutation(&file.fit, &file.effects) {
         file.summary = format!("{} {refutation}", file.summary);
     }
     if runs_away {
@@ -328,11 +328,8 @@ fn written<'d>(
     } else {
         None
     };
-    let leads_astray = |h: &Hypothesis<'_>| astray(&search.setting, &pool[0].base, &h.base);
-    let (modelled, strayed) = match modelled {
-        Some(h) if leads_astray(&h) => (None, true),
-        other => (other, false),
-    };
+    let strayed = modelled.as_ref().is_some_and(|h| astray(&search.setting, &pool[0].base, &h.base));
+    let modelled = modelled.filter(|_| !strayed);
     let note = if modelled.is_some() {
         "the augmented simulation holds the sparse correction, refitted, and no physics that has a name: it predicts blocks of the recordings that it was not fitted to better, and says nothing outside their range"
     } else if strayed {

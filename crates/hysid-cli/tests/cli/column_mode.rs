@@ -110,10 +110,12 @@ fn a_spring_that_hardens_is_found_in_the_clone() {
     assert!(ratio(&d) < 0.5, "{d:#}");
 }
 
+/// An oscillator with another gain, stiffness and damping than the simulator's.
+const OTHER_PARAMETERS: &str = "[parameters]\ng = { value = 4.6, fixed = true }\n[states]\nx = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"g*u - 100*x - 2.2*v\", initial = 0.0 }\n[outputs]\ny_mm = \"x\"\n";
+
 #[test]
 fn wrong_parameters_are_no_missing_physics() {
-    let truth = "[parameters]\ng = { value = 4.6, fixed = true }\n[states]\nx = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"g*u - 100*x - 2.2*v\", initial = 0.0 }\n[outputs]\ny_mm = \"x\"\n";
-    let d = Case { simulator: OSCILLATOR, truth, noise: 0.01, level: 2.0 }.diagnosed();
+    let d = Case { simulator: OSCILLATOR, truth: OTHER_PARAMETERS, noise: 0.01, level: 2.0 }.diagnosed();
     assert_eq!(d["verdict"], "no_significant_mismatch", "{d:#}");
     let summary = d["summary"].as_str().unwrap();
     assert!(summary.contains("frequency 9 -> 10") && summary.contains("parameter error"), "{summary}");
@@ -126,8 +128,7 @@ fn wrong_parameters_are_no_missing_physics() {
 /// Where noise hides nearly all of the output, what the recalibrated clone leaves may be anything.
 #[test]
 fn parameters_do_not_account_for_what_no_simulation_explains() {
-    let truth = "[parameters]\ng = { value = 4.6, fixed = true }\n[states]\nx = { derivative = \"v\", initial = 0.0 }\nv = { derivative = \"g*u - 100*x - 2.2*v\", initial = 0.0 }\n[outputs]\ny_mm = \"x\"\n";
-    let d = Case { simulator: OSCILLATOR, truth, noise: 1.5, level: 2.0 }.diagnosed();
+    let d = Case { simulator: OSCILLATOR, truth: OTHER_PARAMETERS, noise: 1.5, level: 2.0 }.diagnosed();
     assert_eq!(d["verdict"], "no_significant_mismatch", "{d:#}");
     let summary = d["summary"].as_str().unwrap();
     assert!(summary.contains("next to nothing") && summary.contains("frequency 9 ->"), "{summary}");

@@ -302,13 +302,13 @@ pub fn without_mismatch(unexplained: &[(&str, f64)]) -> Option<String> {
 const IN_TIME: [Family; 3] = [Family::TimeVariation, Family::SensorDrift, Family::ExternalDisturbance];
 
 /// What the hold-out says against the augmented simulation, which it has not chosen and does not take back; `None` where it says nothing.
-pub fn refutation(file: &DiagnosisFile) -> Option<String> {
+pub fn refutation(fit: &[FitRecord], effects: &[EffectRecord]) -> Option<String> {
     let worse = |fit: &FitRecord| {
         let told = |ratio: f64| format!("{} times the error of `{}` on {}", number(ratio), fit.output, fit.recording);
         fit.refuted().map(told)
     };
-    let told: Vec<String> = file.fit.iter().filter_map(worse).collect();
-    let in_time = file.effects.iter().any(|e| IN_TIME.iter().any(|family| e.family == family.name()));
+    let told: Vec<String> = fit.iter().filter_map(worse).collect();
+    let in_time = effects.iter().any(|e| IN_TIME.iter().any(|family| e.family == family.name()));
     let why = if in_time { ": what changed during one recording need not change in another" } else { "" };
     (!told.is_empty()).then(|| {
         format!("The hold-out does not bear it out: the simulation makes {} with it{why}.", told.join(" and "))
@@ -378,5 +378,8 @@ mod tests {
         let refuted = |ratio, low| fit(ratio, low).refuted();
         assert_eq!(refuted(1.5, 1.2), Some(1.5));
         assert_eq!((refuted(1.5, 0.9), refuted(1.01, 1.005), refuted(0.5, 0.4)), (None, None, None));
+        assert_eq!(refutation(&[fit(0.5, 0.4)], &[]), None);
+        let told = refutation(&[fit(0.5, 0.4), fit(1.5, 1.2)], &[]).unwrap();
+        assert!(told.contains("1.5 times the error of `h_m` on val.csv"), "{told}");
     }
 }

@@ -78,7 +78,7 @@ impl Site {
     }
 
     /// What [`Self::led`] are among [`Self::symbols`]: the last.
-    pub fn led(&self) -> Range<usize> {
+    pub fn led_at(&self) -> Range<usize> {
         let end = self.symbols().count();
         end - self.led.len()..end
     }
@@ -221,7 +221,7 @@ mod tests {
             let simulation = Simulation::parse(&text, "crane.sim.toml").unwrap();
             let sites = sites(&simulation, &Structure::of(&simulation));
             let site = sites.iter().find(|s| s.slot == "state:w").unwrap();
-            site.led().map(|i| site.symbols().nth(i).unwrap().meaning.to_string()).collect::<Vec<_>>()
+            site.led_at().map(|i| site.symbols().nth(i).unwrap().meaning.to_string()).collect::<Vec<_>>()
         };
         assert_eq!(led_at("a = \"trolley_m_s2\"\nl = \"rope_m\""), ["d(l)"]);
         assert!(led_at("a = \"trolley_m_s2\"\nl = \"load_kg\"").is_empty(), "no place");

@@ -118,11 +118,9 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
                 found.extend(shapes::linked((x, named(v)), other, named(others.end)));
             }
         }
-        found.extend(
-            site.led()
-                .flat_map(|rate| (0..own).map(move |i| (rate, i)))
-                .map(|(rate, i)| shapes::product(named(rate), named(i))),
-        );
+        for rate in site.led_at() {
+            found.extend((0..own).map(|i| shapes::product(named(rate), named(i))));
+        }
         found.extend(site.turns().flat_map(|[speed, angle]| shapes::unbalanced(named(speed), named(angle))));
         if plant && let (Some(first), Some(x)) = (site.own.first(), series.first()) {
             found.extend(past::echoes(&first.name, x, data));

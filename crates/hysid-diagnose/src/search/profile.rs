@@ -106,8 +106,10 @@ fn interval(base: &Base<'_>, shape: &Shape) -> Option<[f64; 2]> {
         place(0.5 * (inside + outside))
     };
     let [low, high] = [side(error.bounds.0), side(error.bounds.1)];
-    let beside = if shape.places == Places::Moments { BESIDE } else { 0 };
-    let others = error.around(here, base.model.data().period_s, beside).into_iter().filter(|at| at.1 <= within);
+    if shape.places != Places::Moments {
+        return Some([low, high]);
+    }
+    let others = error.around(here, base.model.data().period_s, BESIDE).into_iter().filter(|at| at.1 <= within);
     Some(others.fold([low, high], |[low, high], (at, _)| [low.min(at), high.max(at)]))
 }
 
@@ -218,12 +220,15 @@ impl<'a, 'd> Profile<'a, 'd> {
 mod tests {
     use super::*;
     use crate::budget::Budget;
+    use crate::data::DataSet;
+    use crate::mechanism::Mechanism;
     use crate::model::Values;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::search::fitting::refit;
     use crate::search::screen::{Candidate, screen};
+    use crate::slot::Slot;
     use hysid_plant::Simulation;
 
     /// The spring of the oscillator with a further stiffness beyond a knee, in metres, and its candidate in the screening.
@@ -250,6 +255,20 @@ mod tests {
         let mut from = h.base.values();
         from.parameters.insert(shape.name.clone(), value);
         setting.fit(&held, &from, Some(&h.base.whitener), 1, 30).unwrap()
+    }
+
+    /// A simulation with a jump of this parameter, fitted to data.
+    fn with_a_jump<'d>(
+        original: Simulation,
+        data: &'d DataSet,
+        budget: &'d Budget<'d>,
+        slot: &str,
+    ) -> (Setting<'d>, Hypothesis<'d>) {
+        let (setting, none) = calibrated(original, data, NoiseKind::White(1.0), budget);
+        let wanted = |m: &Mechanism, s: &Slot| m.id == "abrupt_change" && s.label == slot;
+        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &wanted);
+        let h = refit(&setting, &none, &found[0]).unwrap();
+        (setting, h)
     }
 
     /// Beside a fit of all the others with the shape held, iterated to its end; far from where the shape stands their tangents no longer hold.
@@ -322,12 +341,7 @@ mod tests {
         y.iter_mut().for_each(|y| *y += noise * random());
         let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
-        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
-        let at_c = |m: &crate::mechanism::Mechanism, s: &crate::slot::Slot| {
-            m.id == "abrupt_change" && s.label == "parameter:c"
-        };
-        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &at_c);
-        let mut h = refit(&setting, &none, &found[0]).unwrap();
+        let (setting, mut h) = with_a_jump(original, &data, &budget, "parameter:c");
         centre_moments(&setting, &mut h);
         let shape = h.effects[0].moments().next().unwrap();
         let profile = Profile::of(&h.base, shape).unwrap();
@@ -369,12 +383,7 @@ mod tests {
         y.iter_mut().for_each(|y| *y += 0.03 * random());
         let data = recorded(&original, period, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
-        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
-        let at_b = |m: &crate::mechanism::Mechanism, s: &crate::slot::Slot| {
-            m.id == "abrupt_change" && s.label == "parameter:b"
-        };
-        let found = screen(&none.base, &setting.original, &[], &none.base.evidence(), &at_b);
-        let mut h = refit(&setting, &none, &found[0]).unwrap();
+        let (_, mut h) = with_a_jump(original, &data, &budget, "parameter:b");
         take_intervals(&mut h);
         let shape = h.effects[0].moments().next().unwrap();
         let profile = Profile::of(&h.base, shape).unwrap();

@@ -168,10 +168,10 @@ impl Finder<'_> {
         let stiff = |(_, t): (f64, &Expr)| t.symbols().iter().any(|s| self.simulation.parameter(s).is_some());
         let forces = |sum: &Expr| sum.terms().into_iter().all(stiff);
         let each = |sum: &Expr, scaled: &dyn Fn(Expr) -> Expr| -> Vec<(f64, Expr)> {
-            let within = sum.terms().into_iter().flat_map(|(own, t)| match t {
-                Expr::Binary(..) if t != sum => self.spread(sign * own, t),
-                _ => vec![(sign * own, t.clone())],
-            });
+            let within = sum
+                .terms()
+                .into_iter()
+                .flat_map(|(own, t)| if t == sum { vec![(sign * own, t.clone())] } else { self.spread(sign * own, t) });
             within.map(|(sign, t)| (sign, scaled(t))).collect()
         };
         match term {

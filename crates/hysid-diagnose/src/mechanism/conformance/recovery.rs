@@ -123,8 +123,7 @@ impl Bench {
     /// is nearest to this share of the outputs.
     pub(super) fn truth(&self, written: &Rewritten, size: f64) -> Option<Truth> {
         let starts = written.starts();
-        let shares: &[f64] =
-            if written.amplitudes.is_empty() { &[0.0] } else { &[0.15, 0.05, 0.015, 0.4, 0.003, 6e-4, 1e-4] };
+        let shares: &[f64] = if written.amplitudes.is_empty() { &[0.0] } else { &[0.15, 0.05, 0.015, 0.4] };
         let off = |effect: f64| (effect / size).ln().abs();
         let mut best: Option<Truth> = None;
         for at in [starts.len() / 2, starts.len() / 4, 3 * starts.len() / 4] {
@@ -135,7 +134,7 @@ impl Bench {
                 let mut values = shapes.clone();
                 for a in &written.amplitudes {
                     let p = written.simulation.parameter(&a.name)?;
-                    values.push((a.name.clone(), (share * a.size).clamp(p.lower(), p.upper())));
+                    values.push((a.name.clone(), (share * size / VISIBLE * a.size).clamp(p.lower(), p.upper())));
                 }
                 let Some(outputs) = outputs(&with(&written.simulation, &values), &self.drive) else { continue };
                 let effect = difference(&self.baseline, &outputs);
@@ -171,13 +170,6 @@ impl<'a> SelfRecord<'a> {
         let sizes = target.iter().map(|y| rms(y.iter().copied()).max(f64::MIN_POSITIVE));
         let whitener = Whitener::of(sizes.map(NoiseModel::white).collect());
         Self { compiled, drive, target, fitted, bounds, layout, whitener }
-    }
-
-    /// The values that the simulation states of what is fitted.
-    #[cfg(test)]
-    pub fn values(&self) -> Vec<f64> {
-        let theta = self.compiled.theta();
-        self.fitted.iter().filter_map(|i| theta.get(*i)).copied().collect()
     }
 
     fn theta(&self, values: &[f64]) -> Vec<f64> {

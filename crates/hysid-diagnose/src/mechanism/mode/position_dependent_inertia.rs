@@ -19,8 +19,8 @@ pub static POSITION_DEPENDENT_INERTIA: Mechanism = Mechanism {
             _ if !slot.has("rad") => with_the_square(slot),
             Purpose::Form(Form::Other) if slot.has("x") => with_the_square(slot),
             Purpose::Screening => {
-                let angle = slot.angle().unwrap_or("rad*x");
-                over_the_turn(slot, "n_w").shape("n_w", "1", Grid::Waves(angle, vec![2.0, 1.0], 0.5)).within(1e-4, 4.0)
+                let waves = Grid::Waves(angle(slot), vec![2.0, 1.0], 0.5);
+                over_the_turn(slot, "n_w").shape("n_w", "1", waves).within(1e-4, 4.0)
             }
             Purpose::Form(Form::Few) => over_the_turn(slot, "1"),
             _ => over_the_turn(slot, "2"),
@@ -39,6 +39,11 @@ fn squared_velocity(slot: &Slot) -> &'static str {
     if slot.has(OWN_VELOCITY) { "v*v_own" } else { "v^2" }
 }
 
+/// The angle in radians.
+fn angle(slot: &Slot) -> &'static str {
+    slot.angle().unwrap_or("rad*x")
+}
+
 /// `m_1*x^2` more.
 fn with_the_square(slot: &Slot) -> Law {
     let measure = format!("{}/x^2", slot.mass_measure());
@@ -47,7 +52,7 @@ fn with_the_square(slot: &Slot) -> Law {
 
 /// A wave of so many periods a turn, at any phase, with nothing more where the angle is zero.
 fn over_the_turn(slot: &Slot, periods: &str) -> Law {
-    let angle = format!("{periods}*{}", slot.angle().unwrap_or("rad*x"));
+    let angle = format!("{periods}*{}", angle(slot));
     let force = format!("0.5*{periods}*rad*(m_c*sin({angle}) + m_s*cos({angle}))*{}", squared_velocity(slot));
     Law::inertia(force, format!("m_c*(1 - cos({angle})) + m_s*sin({angle})"))
         .amplitude("m_c", slot.mass_measure(), -0.4, 2.0)
