@@ -1,4 +1,4 @@
-//! The courses by which a parameter may vary: those of a walk over time, the two phases of an oscillation, a recorded input.
+//! The courses by which a parameter may vary: those of a walk over time, the two phases of an oscillation, a signal of the simulation.
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
@@ -19,7 +19,7 @@ pub enum Course {
     Walk(f64),
     /// It oscillates at this frequency, in hertz.
     Line(f64),
-    /// It follows an input.
+    /// It follows an input or a state.
     Follows(Followed),
 }
 
@@ -68,7 +68,7 @@ impl Time {
         self.at.iter().map(|s| s.iter().map(|t| f(*t)).collect()).collect()
     }
 
-    /// The courses of a walk, each for one standard deviation of a walk that ends one away, the two phases of an oscillation, or those of an input.
+    /// The courses of a walk, each for one standard deviation of a walk that ends one away, the two phases of an oscillation, or those of a signal.
     pub fn courses(&self, course: &Course) -> Vec<Series> {
         match course {
             Course::Walk(_) => (0..COURSES)

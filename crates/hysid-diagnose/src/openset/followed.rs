@@ -1,13 +1,18 @@
-//! Recorded inputs that a parameter may follow.
+//! What a parameter may follow: a recorded input, or a state of the simulation, as a reaction's rate does the temperature.
+
+use hysid_plant::Expr;
 
 use super::course::Series;
+use super::sites::OTHERS;
+use super::terms::held_beyond;
+use crate::model::along;
 use crate::model::base::Base;
-use crate::slot::{Place, Structure};
+use crate::slot::{Place, Structure, is_turn};
 use crate::text::number;
 
-/// How a parameter follows an input.
+/// How a parameter follows a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
+pub enum Way {
     /// In proportion.
     Straight,
     /// As its square.
@@ -16,11 +21,33 @@ enum Way {
     Curved,
 }
 
-/// An input, its square or both, counted from the mean in multiples of the standard deviation.
+impl Way {
+    /// Each of them.
+    pub const ALL: [Self; 3] = [Self::Straight, Self::Squared, Self::Curved];
+}
+
+/// A signal that parameters may follow, counted from its mean in multiples of its standard deviation.
+#[derive(Debug)]
+pub struct Signal {
+    symbol: String,
+    /// Whether it is a state, and no input.
+    state: bool,
+    /// As it is written: a state not further than it was seen to go.
+    text: String,
+    mean: f64,
+    deviation: f64,
+    /// The signal and its square, both without their means.
+    pub courses: [Series; 2],
+}
+
+/// A signal, its square or both, counted from the mean in multiples of the standard deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Followed {
-    /// Its symbol.
+    /// The signal's symbol.
     pub symbol: String,
+    /// Whether it is a state, and no input.
+    pub state: bool,
+    text: String,
     way: Way,
     mean: f64,
     deviation: f64,
@@ -28,14 +55,11 @@ pub struct Followed {
     pub courses: Vec<Series>,
 }
 
-impl Followed {
-    /// All that a parameter of a fitted simulation may follow: what is recorded besides the one input that drives it, and besides a prescribed motion. A
-    /// parameter that follows those is a curved law, which has terms of its own.
+impl Signal {
+    /// All that a parameter of a fitted simulation may follow: what is recorded besides the one input that drives it, the states, but no prescribed motion. A
+    /// parameter that follows that is a curved law, which has terms of its own.
     pub fn all(base: &Base<'_>) -> Vec<Self> {
         let simulation = base.model.simulation();
-        if simulation.inputs.len() < 2 {
-            return Vec::new();
-        }
         let structure = Structure::of(simulation);
         let laws = structure.slots.iter().filter(|s| s.place == Place::ForceLaw);
         let motion: Vec<String> = laws
@@ -43,35 +67,96 @@ impl Followed {
             .flatten()
             .flat_map(|q| q.expression.symbols())
             .collect();
-        let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| !motion.contains(&u.symbol));
-        inputs
-            .flat_map(|(i, u)| [Way::Straight, Way::Squared, Way::Curved].map(|way| Self::new(base, i, &u.symbol, way)))
-            .flatten()
-            .collect()
+        let several = simulation.inputs.len() > 1;
+        let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| several && !motion.contains(&u.symbol));
+        let recorded = |i: usize| base.model.data().stretches.iter().map(|s| s.drive.inputs()[i].clone()).collect();
+        let inputs = inputs.filter_map(|(i, u)| Self::new(&u.symbol, false, recorded(i)));
+        let states = simulation.states.iter().map(|s| &s.name).filter(|name| !is_turn(simulation, name)).take(OTHERS);
+        let states: Vec<&String> = states.collect();
+        let meanings: Vec<Expr> = states.iter().map(|s| Expr::symbol(*s)).collect();
+        let simulated = along(base, &meanings).unwrap_or_default();
+        let states = states.into_iter().zip(simulated).filter_map(|(name, x)| Self::new(name, true, x));
+        inputs.chain(states).collect()
     }
 
-    /// `None` where the input does not move.
-    fn new(base: &Base<'_>, input: usize, symbol: &str, way: Way) -> Option<Self> {
-        let raised = |u: &f64| if way == Way::Squared { u * u } else { *u };
-        let stretches = base.model.data().stretches.iter();
-        let mut series: Series = stretches.map(|s| s.drive.inputs()[input].iter().map(raised).collect()).collect();
-        let count = series.iter().map(Vec::len).sum::<usize>().max(1) as f64;
-        let mean = series.iter().flatten().sum::<f64>() / count;
-        let deviation = (series.iter().flatten().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
+    /// `None` where the signal does not move.
+    fn new(symbol: &str, state: bool, mut series: Series) -> Option<Self> {
+        let text = if state { held_beyond(Expr::symbol(symbol), &series) } else { Expr::symbol(symbol) };
+        let (mean, deviation) = moments(&series);
         series.iter_mut().flatten().for_each(|x| *x = (*x - mean) / deviation);
+        let square = series.iter().map(|s| s.iter().map(|x| x * x - 1.0).collect()).collect();
         let moves = deviation > 1e-9 * mean.abs() && deviation.is_finite();
-        let square = |s: &Vec<f64>| s.iter().map(|x| x * x).collect();
-        let bend = (way == Way::Curved).then(|| series.iter().map(square).collect());
-        let courses = std::iter::once(series).chain(bend).collect();
-        moves.then(|| Self { symbol: symbol.to_owned(), way, mean, deviation, courses })
+        moves.then(|| Self {
+            symbol: symbol.to_owned(),
+            state,
+            text: text.to_string(),
+            mean,
+            deviation,
+            courses: [series, square],
+        })
     }
 
+    /// Its square from zero, by its two courses or by the responses to them.
+    fn squared(&self, [z, square]: [&[f64]; 2]) -> Vec<f64> {
+        let Self { mean, deviation, .. } = self;
+        z.iter().zip(square).map(|(z, s)| deviation * (2.0 * mean * z + deviation * s)).collect()
+    }
+
+    /// The square from zero by stretch, and its standard deviation.
+    fn powers(&self) -> (Series, f64) {
+        let [z, square] = &self.courses;
+        let powers: Series = z.iter().zip(square).map(|(z, s)| self.squared([z, s])).collect();
+        let deviation = moments(&powers).1;
+        (powers, deviation)
+    }
+
+    /// What parameters follow that follow it this way.
+    pub fn followed(&self, way: Way) -> Followed {
+        let Self { symbol, state, text, mean, deviation, courses: [z, _] } = self;
+        let (mean, deviation, courses) = match way {
+            Way::Straight => (*mean, *deviation, vec![z.clone()]),
+            Way::Squared => {
+                let (mut powers, spread) = self.powers();
+                powers.iter_mut().flatten().for_each(|x| *x /= spread);
+                (mean * mean + deviation * deviation, spread, vec![powers])
+            }
+            Way::Curved => (*mean, *deviation, self.courses.to_vec()),
+        };
+        Followed { symbol: symbol.clone(), state: *state, text: text.clone(), way, mean, deviation, courses }
+    }
+
+    /// The responses to what is followed this way, of those to the two courses.
+    pub fn responses(&self, way: Way, [one, two]: [&[f64]; 2]) -> Vec<Vec<f64>> {
+        match way {
+            Way::Straight => vec![one.to_vec()],
+            Way::Squared => {
+                let spread = self.powers().1;
+                vec![self.squared([one, two]).into_iter().map(|x| x / spread).collect()]
+            }
+            Way::Curved => vec![one.to_vec(), two.to_vec()],
+        }
+    }
+
+    /// Whether it is this symbol.
+    pub fn is(&self, symbol: &str) -> bool {
+        self.symbol == symbol
+    }
+}
+
+/// Mean and standard deviation.
+fn moments(series: &Series) -> (f64, f64) {
+    let count = series.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+    let mean = series.iter().flatten().sum::<f64>() / count;
+    (mean, (series.iter().flatten().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt())
+}
+
+impl Followed {
     /// The courses as they are written.
     pub fn texts(&self) -> Vec<String> {
-        let Self { symbol, mean, deviation, .. } = self;
+        let Self { text, mean, deviation, .. } = self;
         let power = if self.way == Way::Squared { "^2" } else { "" };
-        let straight = format!("({symbol}{power} - {mean})/{deviation}");
-        let bend = (self.way == Way::Curved).then(|| format!("({straight})^2"));
+        let straight = format!("({text}{power} - {mean})/{deviation}");
+        let bend = (self.way == Way::Curved).then(|| format!("(({straight})^2 - 1)"));
         std::iter::once(straight).chain(bend).collect()
     }
 
@@ -79,9 +164,10 @@ impl Followed {
     pub fn words(&self, amplitude: f64) -> String {
         let rises = if amplitude < 0.0 { "falls" } else { "rises" };
         let of = if self.way == Way::Squared { "the square of " } else { "" };
+        let what = if self.state { "state" } else { "input" };
         let share = number(100.0 * (amplitude / self.deviation).abs());
         let along = if self.way == Way::Curved { " at its mean, along a curve" } else { "" };
-        format!("{rises} with {of}the input `{}`, by {share} % of its value for each unit of it{along}", self.symbol)
+        format!("{rises} with {of}the {what} `{}`, by {share} % of its value for each unit of it{along}", self.symbol)
     }
 }
 

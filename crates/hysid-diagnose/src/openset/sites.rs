@@ -84,8 +84,8 @@ impl Site {
     }
 }
 
-/// Most states of other parts in which a slot's correction may be written.
-const OTHERS: usize = 6;
+/// Most states of other parts in which a slot's correction may be written, and of those that a parameter may follow.
+pub const OTHERS: usize = 6;
 
 /// The places of a simulation at which generic terms act.
 pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {

@@ -191,7 +191,7 @@ pub fn measured(simulation: &Simulation) -> Vec<(usize, usize, f64)> {
 const BEYOND: f64 = 0.5;
 
 /// A coordinate, held some way beyond the ends of the range that its series has.
-fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
+pub fn held_beyond(coordinate: Expr, x: &[Vec<f64>]) -> Expr {
     let (low, high) = range(x.iter().flatten().copied());
     let further = BEYOND * (high - low);
     Expr::call2(Function::Min, Expr::call2(Function::Max, coordinate, low - further), high + further)

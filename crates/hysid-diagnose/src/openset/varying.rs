@@ -1,16 +1,18 @@
-//! Parameters that are not constant: a parameter or an input gain that wanders, that oscillates at a frequency of its own, or that follows a recorded input.
+//! Parameters that are not constant: a parameter or an input gain that wanders, that oscillates at a frequency of its own, or that follows a recorded input or a
+//! state.
 //!
 //! No feature of the catalogue need resemble what such a parameter does, and a noise model that was fitted to the residual takes it for noise. So each
 //! modulation is judged by its evidence with a noise model of its own, under the noise of the fit and, where that is coloured, from white
 //! noise. A walk pays for what the recording settles of it ([`Wander`]); an oscillation pays for two amplitudes, and for the lines and parameters among
-//! which it was found; what follows an input for one, along a curve for two, and for the inputs and parameters.
+//! which it was found; what follows a signal for one, along a curve for two, and for the signals and parameters.
 
 use std::f64::consts::SQRT_2;
 
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 
 use super::course::{COURSES, Course, Series, Time};
-use super::followed::Followed;
+use super::followed::{Signal, Way};
 use super::modulation::{Modulated, modulated};
 use super::regress::regress;
 use super::view::View;
@@ -117,17 +119,18 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<
         (0..symbols.len()).flat_map(|i| courses.iter().map(move |w| (i, w.clone()))).collect();
     let of_walks: Vec<Option<Vec<Vec<f64>>>> =
         machine.responses(&requests).chunks(COURSES).map(|some| some.iter().cloned().collect()).collect();
-    let inputs = Followed::all(base);
-    let following = following(&machine, &symbols, &inputs);
+    let signals = Signal::all(base);
+    let pairs = pairs(&machine, &symbols, &signals);
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
     let mut best: Option<Varying> = None;
     for noise in noises {
         let view = View::new(base, noise);
         let mut found = likely_walks(&view, kind, &of_walks);
         found.extend(likely_lines(base, &view, &machine, &time, symbols.len()));
-        found.extend(likely_to_follow(&view, &following));
+        found.extend(likely_to_follow(&view, &pairs));
         for candidate in found {
-            let Some(v) = judged(base, kind, noise, (&symbols, following.len()), &time, candidate, none) else {
+            let Some(v) = judged(base, kind, noise, (&symbols, Way::ALL.len() * pairs.len()), &time, candidate, none)
+            else {
                 continue;
             };
             if best.as_ref().is_none_or(|b| v.gain > b.gain) {
@@ -153,33 +156,47 @@ fn likely_walks(view: &View<'_>, kind: NoiseKind, of_walks: &[Option<Vec<Vec<f64
     found
 }
 
-/// A parameter that follows an input, with the responses to its courses.
-type Following<'a> = (usize, &'a Followed, Vec<Vec<f64>>);
+/// A parameter that may follow a signal, with the responses to the signal's courses.
+struct Pair<'s> {
+    symbol: usize,
+    signal: &'s Signal,
+    responses: [Vec<f64>; 2],
+}
 
-/// Every symbol with every input that it may follow.
-fn following<'a>(machine: &Modulated<'_>, symbols: &[String], inputs: &'a [Followed]) -> Vec<Following<'a>> {
-    let pairs = inputs.iter().flat_map(|u| (0..symbols.len()).map(move |i| (i, u)));
-    let pairs: Vec<(usize, &Followed)> = pairs.filter(|(i, u)| symbols[*i] != u.symbol).collect();
-    let courses = |(i, u): &(usize, &Followed)| u.courses.iter().map(|c| (*i, c.clone())).collect::<Vec<_>>();
+impl Pair<'_> {
+    /// The responses to what is followed this way.
+    fn columns(&self, way: Way) -> Vec<Vec<f64>> {
+        self.signal.responses(way, [&self.responses[0], &self.responses[1]])
+    }
+}
+
+/// Every symbol with every signal that it may follow.
+fn pairs<'s>(machine: &Modulated<'_>, symbols: &[String], signals: &'s [Signal]) -> Vec<Pair<'s>> {
+    let pairs = signals.iter().flat_map(|s| (0..symbols.len()).map(move |i| (i, s)));
+    let pairs: Vec<(usize, &Signal)> = pairs.filter(|(i, s)| !s.is(&symbols[*i])).collect();
+    let courses = |(i, s): &(usize, &Signal)| s.courses.clone().map(|c| (*i, c));
     let requests: Vec<(usize, Series)> = pairs.iter().flat_map(courses).collect();
     let mut responses = machine.responses(&requests).into_iter();
-    let of = |(i, u): (usize, &'a Followed)| {
-        let columns: Vec<Option<Vec<f64>>> = responses.by_ref().take(u.courses.len()).collect();
-        Some((i, u, columns.into_iter().collect::<Option<_>>()?))
+    let of = |(symbol, signal): (usize, &'s Signal)| {
+        let (one, two) = (responses.next()?, responses.next()?);
+        Some(Pair { symbol, signal, responses: [one?, two?] })
     };
     pairs.into_iter().filter_map(of).collect()
 }
 
-/// The parameters that explain most under this noise where they follow an input.
-fn likely_to_follow(view: &View<'_>, following: &[Following<'_>]) -> Vec<Candidate> {
-    let one = |(symbol, input, columns): &Following<'_>| {
-        let course = Course::Follows((*input).clone());
-        Candidate { symbol: *symbol, course, gain: view.free_gain(columns), columns: columns.clone() }
+/// The parameters that explain most under this noise where they follow a signal.
+fn likely_to_follow(view: &View<'_>, pairs: &[Pair<'_>]) -> Vec<Candidate> {
+    let mut gains: Vec<(f64, &Pair<'_>, Way)> = pairs
+        .par_iter()
+        .flat_map_iter(|pair| Way::ALL.map(|way| (view.free_gain(&pair.columns(way)), pair, way)))
+        .collect();
+    gains.sort_by(|a, b| b.0.total_cmp(&a.0));
+    gains.truncate(FOLLOWING);
+    let candidate = |(gain, pair, way): (f64, &Pair<'_>, Way)| {
+        let course = Course::Follows(pair.signal.followed(way));
+        Candidate { symbol: pair.symbol, course, columns: pair.columns(way), gain }
     };
-    let mut found: Vec<Candidate> = following.iter().map(one).collect();
-    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    found.truncate(FOLLOWING);
-    found
+    gains.into_iter().map(candidate).collect()
 }
 
 /// The lines of the parameters' scores that explain most under this noise.
