@@ -212,6 +212,7 @@ impl Finder<'_> {
         }
         if let Some(x) = motion.x {
             slot.offer(self.simulation, "x", Expr::symbol(x));
+            slot.measure_rate("v", "x");
         }
         if let Some(turn) = motion.turn {
             slot.offer(self.simulation, "turn", Expr::symbol(turn));

@@ -169,6 +169,15 @@ impl Slot {
         }
     }
 
+    /// Gives a symbol whose unit is not known (a velocity in thousandths) that of the rate of another.
+    fn measure_rate(&mut self, symbol: &str, of: &str) {
+        let per_second = |unit: &Unit| Some(unit.per(&Unit::parse("s").ok()?));
+        let unit = self.quantity(of).and_then(|q| q.unit.as_ref()).and_then(per_second);
+        if let Some(quantity) = self.symbols.get_mut(symbol).filter(|q| q.unit.is_none()) {
+            quantity.unit = unit;
+        }
+    }
+
     /// Leaves the unit of a symbol open.
     fn forget_unit(&mut self, symbol: &str) {
         if let Some(quantity) = self.symbols.get_mut(symbol) {

@@ -307,12 +307,9 @@ impl<'a> Graph<'a> {
             let a = self.build(argument);
             return self.push(Node::Call(function, a));
         }
-        // `sign(-s)` and `sign(b - a)` switch where `sign(s)` and `sign(a - b)` do, the other way.
-        let (mut argument, mut flipped) = (argument.simplified(), false);
-        while let Expr::Neg(inner) = argument {
-            argument = *inner;
-            flipped = !flipped;
-        }
+        // `sign(-s)`, `sign(p*s)` and `sign(b - a)` switch where `sign(s)` and `sign(a - b)` do, maybe the other way. Of two surfaces in one place both would stick,
+        // and which of them holds the motion is not settled.
+        let (mut argument, factors, mut flipped) = self.unscaled(argument.simplified());
         if let Expr::Binary(BinaryOp::Sub, a, b) = &argument {
             let other = Expr::Binary(BinaryOp::Sub, b.clone(), a.clone());
             if self.surfaces.iter().any(|(known, _)| *known == other) {
@@ -332,12 +329,38 @@ impl<'a> Graph<'a> {
         if flipped {
             sigma = self.push(Node::Neg(sigma));
         }
+        for factor in &factors {
+            let factor = self.build(factor);
+            let side = self.push(Node::Call(Function::Sign, factor));
+            sigma = self.push(Node::Mul(side, sigma));
+        }
         if function == Function::Step {
             let half = self.push(Node::Constant(0.5));
             let halved = self.push(Node::Mul(half, sigma));
             sigma = self.push(Node::Add(half, halved));
         }
         sigma
+    }
+
+    /// What moves in a product or quotient with parameters and numbers, these, and whether its sign is the other one. Positive numbers are left out.
+    fn unscaled(&self, mut argument: Expr) -> (Expr, Vec<Expr>, bool) {
+        let parameter = |name: &String| name == "pi" || self.simulation.parameter(name).is_some();
+        let still = |e: &Expr| !e.has_memory() && e.symbols().iter().all(parameter);
+        let (mut factors, mut flipped) = (Vec::new(), false);
+        loop {
+            let (factor, rest) = match argument {
+                Expr::Neg(rest) => (Expr::Number(-1.0), *rest),
+                Expr::Binary(BinaryOp::Mul, factor, rest) if still(&factor) => (*factor, *rest),
+                Expr::Binary(BinaryOp::Mul | BinaryOp::Div, rest, factor) if still(&factor) => (*factor, *rest),
+                other => return (other, factors, flipped),
+            };
+            match factor {
+                Expr::Number(x) if x > 0.0 => {}
+                Expr::Number(x) if x < 0.0 => flipped = !flipped,
+                factor => factors.push(factor),
+            }
+            argument = rest;
+        }
     }
 
     fn surface(&mut self, argument: &Expr) -> SurfaceNodes {

@@ -127,3 +127,34 @@ fn finer_steps_tell_the_same_of_a_lagging_command() {
         }
     }
 }
+
+#[test]
+fn friction_that_is_told_in_another_unit_of_speed_sticks_with_the_other() {
+    // A part of the friction as a function of the speed in thousandths, over a parameter, and the other way round.
+    let parameters = |dry: f64| [("J", INERTIA), ("b", VISCOUS), ("F_c", dry), ("F_d", DRY - dry), ("n", -3.0)];
+    let machine = |dry: f64, sign: &str| {
+        let torque = format!("(u - b*w - F_c*sign(w) - F_d*{sign})/J");
+        model("linear", &parameters(dry), &[("q", "w", "0.0"), ("w", &torque, "0.0")], &[("q_rad", "q")])
+    };
+    let drive = drive(300);
+    let run = |machine: &Compiled| {
+        let theta = machine.theta();
+        let directions = [0, 1, 2, 3].map(Direction::Parameter);
+        machine.sensitivities(&Run::new(&drive, &theta).with_substeps(8), &directions)
+    };
+    let whole = run(&machine(DRY, "sign(w)"));
+    for sign in
+        ["sign(1000*w)", "sign(w/0.001)", "(-sign(-w))", "(-sign(w/n))", "(-sign(2*n*w))", "(2*step(1000*w) - 1)"]
+    {
+        for dry in [DRY, 0.3 * DRY] {
+            let parted = run(&machine(dry, sign));
+            let size = rms(&whole.response.outputs[0], &[0.0; 300]);
+            assert!(rms(&parted.response.outputs[0], &whole.response.outputs[0]) < 1e-9 * size, "{sign}");
+            for (p, tangent) in parted.tangents.iter().enumerate() {
+                let expected = &whole.tangents[p.min(2)][0];
+                let error = rms(&tangent[0], expected);
+                assert!(error < 1e-6 * rms(expected, &[0.0; 300]), "{sign}, parameter {p}: {error}");
+            }
+        }
+    }
+}
