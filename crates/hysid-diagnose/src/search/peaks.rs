@@ -18,16 +18,21 @@ const NEAR: f64 = 0.25;
 /// in such a recording says that it follows the clock.
 pub fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
     let data = base.model.data();
-    let Some(series) = data.layout.series.iter().max_by_key(|s| s.rows.len()) else { return Vec::new() };
+    let Some(longest) = data.layout.series.iter().max_by_key(|s| s.rows.len()) else { return Vec::new() };
+    let (rows, stretch) = (longest.rows.len(), longest.stretch);
     let white = base.whitener.apply(&data.layout, &base.fit.residual);
-    let x = &white[series.rows.clone()];
-    let lines = hysid_signal::fourier(x);
-    let power: Vec<f64> = lines.iter().map(|(re, im)| re * re + im * im).collect();
+    // A force need not show in all outputs.
+    let outputs = || data.layout.series.iter().filter(|s| s.stretch == stretch && s.rows.len() == rows);
+    let mut power = vec![0.0; rows / 2 + 1];
+    for series in outputs() {
+        let lines = hysid_signal::fourier(&white[series.rows.clone()]);
+        power.iter_mut().zip(&lines).for_each(|(p, (re, im))| *p += re * re + im * im);
+    }
     // The frequency of a line's place, in periods within the recording.
-    let inputs = data.stretches[series.stretch].drive.inputs();
-    let of_inputs = inputs.iter().filter_map(|u| cycle(&data.rows_of(series, u)));
-    let cycles: Vec<f64> =
-        cycle(&data.y[series.rows.clone()]).into_iter().chain(of_inputs).map(|rows| x.len() as f64 / rows).collect();
+    let inputs = data.stretches[stretch].drive.inputs();
+    let of_inputs = inputs.iter().filter_map(|u| cycle(&data.rows_of(longest, u)));
+    let of_outputs = outputs().filter_map(|s| cycle(&data.y[s.rows.clone()]));
+    let cycles: Vec<f64> = of_outputs.chain(of_inputs).map(|one| rows as f64 / one).collect();
     let of_motion = |at: f64| cycles.iter().any(|n| (at - n * (at / n).round()).abs() < NEAR);
     let mut peaks: Vec<(usize, f64)> = (2..power.len().saturating_sub(1))
         .filter(|&k| power[k] > power[k - 1] && power[k] >= power[k + 1])
@@ -36,7 +41,7 @@ pub fn residual_peaks(base: &Base<'_>) -> Vec<f64> {
         .collect();
     peaks.sort_by(|a, b| power[b.0].total_cmp(&power[a.0]));
     peaks.truncate(LINES);
-    let width = 1.0 / (data.row_period_s() * x.len() as f64);
+    let width = 1.0 / (data.row_period_s() * rows as f64);
     let mut out: Vec<f64> = peaks.into_iter().map(|(_, at)| at * width).collect();
     out.sort_by(f64::total_cmp);
     out
@@ -94,7 +99,7 @@ mod tests {
     use crate::budget::Budget;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
-    use crate::oscillator::{BASELINE, PERIOD, REAL, normal, respond, rms};
+    use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
 
     /// Peaks of what an oscillator under this input leaves of a sensor that runs away, so that the output does not repeat itself, with a line at this
     /// frequency in hertz.
@@ -120,6 +125,28 @@ mod tests {
         assert!(!has(&peaks(sine, 2.4), 2.4), "the third harmonic");
         assert!(has(&peaks(sine, 2.05), 2.05), "a line beside it");
         assert!(has(&peaks(|t| sine(t * (1.0 + 0.02 * t)), 2.4), 2.4), "an input that does not repeat itself");
+    }
+
+    #[test]
+    fn a_line_is_seen_in_whichever_output_it_is() {
+        let original = Simulation::parse(&(BASELINE.to_owned() + "double_m = \"2*x\"\n"), "test.sim.toml").unwrap();
+        let u = drive(1200, &mut normal(3));
+        let motion = respond(&u, REAL, |_, _| 0.0);
+        for shown in 0..2 {
+            let mut random = normal(4);
+            let mut read = |output: usize| -> Vec<f64> {
+                let (times, share) = ([1.0, 2.0][output], if output == shown { 0.01 } else { 0.0 });
+                let line = |n: usize| share * (std::f64::consts::TAU * 2.05 * PERIOD * n as f64).sin();
+                let size = rms(&motion);
+                let of = |(n, x): (usize, &f64)| times * x + size * (line(n) + 0.02 * random());
+                motion.iter().enumerate().map(of).collect()
+            };
+            let (x, double) = (read(0), read(1));
+            let data = recorded(&original, PERIOD, [("u_N", u.clone()), ("x_m", x), ("double_m", double)]);
+            let budget = Budget::new(&|_| false);
+            let peaks = residual_peaks(&calibrated(original.clone(), &data, NoiseKind::White(1.0), &budget).1.base);
+            assert!(peaks.iter().any(|p| (p - 2.05).abs() < 0.01), "{shown}: {peaks:?}");
+        }
     }
 
     #[test]
