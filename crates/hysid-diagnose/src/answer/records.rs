@@ -8,6 +8,7 @@ use super::bootstrap::{ratio_of_rms, rms};
 use super::locate;
 use super::report_values::{reported, sentence};
 use crate::data::DataSet;
+use crate::evidence::{Series, norm2};
 use crate::file::*;
 use crate::mechanism::{Block, Family, number_with_unit};
 use crate::model::base::{Base, Interval};
@@ -117,10 +118,12 @@ pub fn location(none: &Hypothesis<'_>, best: &Hypothesis<'_>, candidates: &[Cand
             time_s.push([at(rows.start), at(rows.end.max(1) - 1)]);
         }
     }
-    let longest = data.layout.series.iter().max_by_key(|s| s.rows.len())?;
+    // Where it shows most.
+    let shown = |s: &Series| norm2(&g[s.rows.clone()]);
+    let loudest = data.layout.series.iter().max_by(|a, b| shown(a).total_cmp(&shown(b)))?;
     let band_hz = locate::bands(
-        &none.base.fit.residual[longest.rows.clone()],
-        &best.base.fit.residual[longest.rows.clone()],
+        &none.base.fit.residual[loudest.rows.clone()],
+        &best.base.fit.residual[loudest.rows.clone()],
         data.row_period_s(),
     );
     let region = super::region::words(none, best).unwrap_or_else(|| "everywhere on the trajectory".into());

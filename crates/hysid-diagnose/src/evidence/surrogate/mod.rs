@@ -77,17 +77,19 @@ pub struct Contender<'a> {
     pub handicap: f64,
 }
 
-/// Samples until the autocorrelation of the series is first below 0.1, at least 1, over the longest series of the stack: a quarter of a period where the
-/// series oscillates.
+/// Samples until the autocorrelation is first below 0.1, at least 1, in the mean over the longest series of the stack: a quarter of a period where they
+/// oscillate.
 pub fn correlation_time(layout: &Layout, r: &[f64]) -> usize {
-    let Some(s) = layout.series.iter().max_by_key(|s| s.rows.len()) else { return 1 };
-    let x = &r[s.rows.clone()];
-    let power = norm2(x);
-    if power <= 0.0 {
+    let Some(rows) = layout.series.iter().map(|s| s.rows.len()).max() else { return 1 };
+    let longest = layout.series.iter().filter(|s| s.rows.len() == rows).map(|s| &r[s.rows.clone()]);
+    let series: Vec<(&[f64], f64)> = longest.map(|x| (x, norm2(x))).filter(|(_, power)| *power > 0.0).collect();
+    if series.is_empty() {
         return 1;
     }
-    let limit = (x.len() / 20).max(1);
-    (1..limit).find(|&k| (x[k..].iter().zip(x).map(|(a, b)| a * b).sum::<f64>() / power).abs() < 0.1).unwrap_or(limit)
+    let limit = (rows / 20).max(1);
+    let at = |k: usize, (x, power): &(&[f64], f64)| x[k..].iter().zip(*x).map(|(a, b)| a * b).sum::<f64>() / power;
+    let mean = |k: usize| series.iter().map(|s| at(k, s)).sum::<f64>() / series.len() as f64;
+    (1..limit).find(|&k| mean(k).abs() < 0.1).unwrap_or(limit)
 }
 
 /// Surrogates that are scored together: the groups' columns are far more than a cache holds, and each is read once for all of them.
@@ -374,5 +376,20 @@ mod tests {
             pool.install(|| p_value(&e, 1))
         };
         assert_eq!(run(1).to_bits(), run(3).to_bits());
+    }
+
+    #[test]
+    fn the_correlation_time_is_that_of_all_outputs() {
+        let wave: Vec<f64> = (0..N).map(|n| (std::f64::consts::TAU * n as f64 / 80.0).cos()).collect();
+        let white = noise(0, 5);
+        let series = |i: usize| Series { stretch: 0, output: i, first: 0, rows: i * N..(i + 1) * N };
+        let one = Layout { series: vec![series(0)], outputs: 1 };
+        // Where the cosine is 0.1, and where it is 0.2.
+        assert_eq!(correlation_time(&one, &wave), 19);
+        let both = Layout { series: vec![series(0), series(1)], outputs: 2 };
+        let stacked = |a: &[f64], b: &[f64]| [a, b].concat();
+        let found = [stacked(&wave, &white), stacked(&white, &wave)].map(|r| correlation_time(&both, &r));
+        assert!(found[0] == found[1] && (15..=19).contains(&found[0]), "{found:?}");
+        assert_eq!(correlation_time(&both, &stacked(&wave, &vec![0.0; N])), 19);
     }
 }
