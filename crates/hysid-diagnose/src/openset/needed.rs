@@ -7,7 +7,7 @@
 use hysid_plant::Simulation;
 
 use super::written::Sparse;
-use super::{Writable, correction};
+use super::{OpenSet, Writable, correction};
 use crate::budget::Step;
 use crate::evidence::{dot, norm2};
 use crate::file::TermRecord;
@@ -35,14 +35,22 @@ struct Fit<'d> {
     hypothesis: Hypothesis<'d>,
 }
 
-/// The correction fitted in the place of, or on top of, a set, without the terms that it does not need; further ones are looked for where it reaches this
-/// log evidence without them.
-pub fn fitted<'d>(
+/// A correction as [`fitted`], or the rival of it, whichever has more evidence once it stands in the equations, with what the tangent said of that.
+pub fn likelier<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'d>,
-    writable: &Writable,
+    open: &OpenSet,
     least: f64,
-) -> Option<Refitted<'d>> {
+) -> Option<(Refitted<'d>, OpenSet)> {
+    let of = |o: &OpenSet| Some((fitted(setting, parent, o.writable.as_ref()?, least)?, o.clone()));
+    let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - o.choice;
+    let both = [of(open), open.rival.as_deref().and_then(of)];
+    both.into_iter().flatten().max_by(|a, b| lead(a).total_cmp(&lead(b)))
+}
+
+/// The correction fitted in the place of, or on top of, a set, without the terms that it does not need; further ones are looked for where it reaches this
+/// log evidence without them.
+fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable, least: f64) -> Option<Refitted<'d>> {
     let sparse = match writable {
         Writable::Varying(simulation) => {
             let hypothesis = fit(setting, parent, &parent.base.values(), simulation)?;

@@ -9,7 +9,7 @@ use crate::evidence::better_by_chance;
 use crate::file::{CorrectionRecord, RemainingRecord, finite};
 use crate::model::base::{Base, MAX_AR};
 use crate::model::hypothesis::{Hypothesis, block_score};
-use crate::openset::needed::{Refitted, fitted};
+use crate::openset::needed::{Refitted, likelier};
 use crate::openset::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
 use crate::search::{Search, leaves_more};
 
@@ -44,7 +44,7 @@ pub struct Remaining<'d> {
     /// Generic terms in its place, refitted, where those explain far more, with what the tangent said of them.
     swapped: Option<(Refitted<'d>, OpenSet)>,
     /// The generic terms of the simulation without effects, refitted, where that was tried and did not explain far more.
-    tried: Option<Refitted<'d>>,
+    tried: Option<(Refitted<'d>, OpenSet)>,
     /// What is written into the simulation, as it was refitted.
     written: Option<CorrectionRecord>,
     /// Whether generic terms explain so much that the set is an imitation.
@@ -138,23 +138,22 @@ impl<'d> Remaining<'d> {
         let setting = &search.setting;
         let swapped = self.swapped.take();
         let replaced = swapped.is_some();
-        let (Refitted { hypothesis: best, terms, slot }, of, sure) = match swapped {
-            Some((refitted, of)) => (refitted, of, true),
+        let (Refitted { hypothesis: best, terms, slot }, of, sure, on_top) = match swapped {
+            Some((refitted, of)) => (refitted, of, true, false),
             None => {
                 let tried = self.tried.take();
                 let left = self.open.as_ref().filter(|_| trusted);
-                let on_top = left
-                    .and_then(|o| Some((o, fitted(setting, &pool[winner], o.writable.as_ref()?, f64::NEG_INFINITY)?)));
+                let on_top = left.and_then(|o| likelier(setting, &pool[winner], o, f64::NEG_INFINITY));
                 let generic = if winner > 0 { search.open(&pool[0]) } else { None };
-                let instead = generic.as_ref().and_then(|o| {
-                    let refitted =
-                        tried.or_else(|| fitted(setting, &pool[0], o.writable.as_ref()?, f64::NEG_INFINITY))?;
-                    Some((o, refitted))
-                });
-                let both = on_top.into_iter().chain(instead);
-                let (of, refitted) =
-                    both.max_by(|(_, a), (_, b)| a.hypothesis.log_evidence.total_cmp(&b.hypothesis.log_evidence))?;
-                (refitted, of.clone(), self.stands_by_evidence(of))
+                let instead = tried.or_else(|| likelier(setting, &pool[0], generic.as_ref()?, f64::NEG_INFINITY));
+                let evidence = |(r, _): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence;
+                let first = match (&on_top, &instead) {
+                    (Some(a), Some(b)) => evidence(a) > evidence(b),
+                    (a, _) => a.is_some(),
+                };
+                let (refitted, of) = if first { on_top? } else { instead? };
+                let sure = self.stands_by_evidence(&of);
+                (refitted, of, sure, first)
             }
         };
         let driven = pool[otherwise].base.driven() && best.base.driven();
@@ -171,6 +170,8 @@ impl<'d> Remaining<'d> {
             // What stands in the set's place is told.
             let gain = best.log_evidence - pool[0].log_evidence - of.choice;
             self.instead = Some(OpenSet { gain, block_ratio: ratio, ..of });
+        } else if on_top {
+            self.open = Some(of);
         }
         let stands = (sure && better) || better_by_chance(&before, &after)? < BY_CHANCE;
         self.written = (stands && !record.terms.is_empty()).then_some(record);
@@ -221,28 +222,28 @@ fn in_place<'d>(
     best: &Hypothesis<'d>,
     seen: Option<&OpenSet>,
     generic: Option<&OpenSet>,
-) -> (Option<(Refitted<'d>, OpenSet)>, Option<Refitted<'d>>) {
+) -> (Option<(Refitted<'d>, OpenSet)>, Option<(Refitted<'d>, OpenSet)>) {
     let explained = best.log_evidence - none.log_evidence;
     let halfway = none.log_evidence + HALFWAY * explained;
     let likely =
         |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.gains_by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
-    let refitted = |o: &OpenSet, writable: Writable| {
-        let fit = || fitted(&search.setting, none, &writable, halfway);
-        let fit = if search.setting.budget.omits(Step::Imitation) { None } else { fit() };
-        Some((fit?, o.clone()))
+    let refitted = |o: &OpenSet| {
+        if search.setting.budget.omits(Step::Imitation) { None } else { likelier(&search.setting, none, o, halfway) }
     };
     // A parameter that varies beside the set is written into the set's simulation.
     let beside = |o: &OpenSet| match o.writable.as_ref()? {
-        Writable::Sparse(terms) => refitted(o, Writable::Sparse(terms.within(none.base.document()))),
+        Writable::Sparse(terms) => {
+            let writable = Some(Writable::Sparse(terms.within(none.base.document())));
+            refitted(&OpenSet { writable, rival: None, ..o.clone() })
+        }
         Writable::Varying(_) => None,
     };
-    let alone = |o: &OpenSet| refitted(o, o.writable.clone()?);
     let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - best.log_evidence - o.choice;
-    let (beside, alone) = (seen.and_then(beside), generic.filter(likely).and_then(alone));
+    let (beside, alone) = (seen.and_then(beside), generic.filter(likely).and_then(refitted));
     let leads = |swapped: &Option<(Refitted<'d>, OpenSet)>| swapped.as_ref().map(lead).filter(|l| *l > FAR_MORE);
     match (leads(&beside), leads(&alone)) {
         // One that was left halfway is no correction yet.
-        (None, None) => (None, alone.map(|(refitted, _)| refitted).filter(|r| r.hypothesis.log_evidence >= halfway)),
+        (None, None) => (None, alone.filter(|(r, _)| r.hypothesis.log_evidence >= halfway)),
         (Some(a), b) if b.is_none_or(|b| b < a) => (beside, None),
         _ => (alone, None),
     }
