@@ -166,14 +166,14 @@ impl<'d> Remaining<'d> {
         let better = ratio < 1.0;
         let slot = slot.unwrap_or_else(|| of.record.slot.clone());
         let record = CorrectionRecord { slot, terms, ratio: finite(ratio), ..of.record.clone() };
-        if replaced {
+        let stands = (sure && better) || better_by_chance(&before, &after).is_some_and(|p| p < BY_CHANCE);
+        if replaced || (stands && !on_top) {
             // What stands in the set's place is told.
             let gain = best.log_evidence - pool[0].log_evidence - of.choice;
             self.instead = Some(OpenSet { gain, block_ratio: ratio, ..of });
         } else if on_top {
             self.open = Some(of);
         }
-        let stands = (sure && better) || better_by_chance(&before, &after)? < BY_CHANCE;
         self.written = (stands && !record.terms.is_empty()).then_some(record);
         stands.then_some(best)
     }
