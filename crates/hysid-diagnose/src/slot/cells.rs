@@ -24,6 +24,14 @@ impl Finder<'_> {
         self.sum_of_forces(motion, &counts)
     }
 
+    /// All that pulls at a part by the deflection of a connection and its rate, as across what is led at its other end.
+    fn force_across(&self, slot: &Slot, motion: &Motion<'_>) -> Option<Expr> {
+        let across = ["x", "v"].map(|n| slot.quantity(n)).into_iter().flatten();
+        let symbols: Vec<String> = across.flat_map(|q| q.expression.symbols()).collect();
+        let states = || symbols.iter().filter(|s| self.simulation.state(s).is_some());
+        self.sum_of_forces(motion, &|term| states().any(|s| term.uses(s)))
+    }
+
     fn in_load_cell(&self, slot: &Slot) -> Option<Slot> {
         let simulation = self.original;
         let connects = match slot.place {
@@ -36,9 +44,12 @@ impl Finder<'_> {
         let ends = pulls.iter().filter_map(|pull| self.motions.iter().find(|m| m.state == pull.state));
         let held: Vec<(&str, f64, Expr)> = ends
             .flat_map(|motion| {
-                let deflection = if connects { self.force_of_deflection(slot, motion) } else { None };
-                let held = [self.forces_on(motion, connects), deflection].into_iter().flatten();
-                held.map(|held| peeled(&held)).map(|(scale, held)| (motion.state, scale, held))
+                let mut held: Vec<Expr> = self.forces_on(motion, connects).into_iter().collect();
+                if connects {
+                    held.extend(self.force_of_deflection(slot, motion));
+                    held.extend(self.force_across(slot, motion));
+                }
+                held.into_iter().map(|held| peeled(&held)).map(|(scale, held)| (motion.state, scale, held))
             })
             .collect();
         let cell = |output: &Output| {
@@ -103,6 +114,18 @@ mod tests {
         let simulation = Simulation::parse(text, "hoist.sim.toml").unwrap();
         let found = sprung(&simulation, 1);
         assert!(found.iter().any(|(_, read)| read == "k*e - k_2*(-e)^2"), "{found:?}");
+    }
+
+    #[test]
+    fn what_stands_on_a_table_is_held_by_what_the_cell_under_it_measures() {
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nz = \"table_mm\"\n[parameters]\nk = { value = 25.0, min = 1.0, unit = \"N/m\" }\n\
+            c = { value = 0.1, min = 0.01, unit = \"N s/m\" }\nm = { value = 2.0, min = 0.1, unit = \"kg\" }\n\
+            [states]\nr = { derivative = \"w - 0.001*d(z)\", initial = 0.0, unit = \"m\" }\nw = { derivative = \"-(k*r + c*(w - 0.001*d(z)))/m\", initial = 0.0, unit = \"m/s\" }\n\
+            [outputs]\ncell_kN = \"(k*r + c*(w - 0.001*d(z)))/1000\"\ncar_m_s2 = \"-(k*r + c*(w - 0.001*d(z)))/m\"\n";
+        let simulation = Simulation::parse(text, "rig.sim.toml").unwrap();
+        let felt = |slot: &Slot| slot.place == Place::Connection && slot.sensed.len() > 1;
+        let (_, read) = sprung(&simulation, 0).into_iter().find(|(slot, _)| felt(slot)).unwrap();
+        assert!(read.starts_with("(k*r + c*(w - 0.001*d(z)))/1000 + 0.001*(k_2*"), "{read}");
     }
 
     #[test]
