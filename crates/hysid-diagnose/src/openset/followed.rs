@@ -1,6 +1,6 @@
 //! What a parameter may follow: a recorded input, or a state of the simulation, as a reaction's rate does the temperature.
 
-use hysid_plant::Expr;
+use hysid_plant::{Expr, Simulation, Unit};
 
 use super::course::Series;
 use super::sites::OTHERS;
@@ -32,6 +32,7 @@ pub struct Signal {
     symbol: String,
     /// Whether it is a state, and no input.
     state: bool,
+    unit: Option<Unit>,
     /// As it is written: a state not further than it was seen to go.
     text: String,
     mean: f64,
@@ -47,6 +48,7 @@ pub struct Followed {
     pub symbol: String,
     /// Whether it is a state, and no input.
     pub state: bool,
+    unit: Option<Unit>,
     text: String,
     way: Way,
     mean: f64,
@@ -70,17 +72,19 @@ impl Signal {
         let several = simulation.inputs.len() > 1;
         let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| several && !motion.contains(&u.symbol));
         let recorded = |i: usize| base.model.data().stretches.iter().map(|s| s.drive.inputs()[i].clone()).collect();
-        let inputs = inputs.filter_map(|(i, u)| Self::new(&u.symbol, false, recorded(i)));
+        let inputs = inputs.filter_map(|(i, u)| Self::new(simulation, &u.symbol, recorded(i)));
         let states = simulation.states.iter().map(|s| &s.name).filter(|name| !is_turn(simulation, name)).take(OTHERS);
         let states: Vec<&String> = states.collect();
         let meanings: Vec<Expr> = states.iter().map(|s| Expr::symbol(*s)).collect();
         let simulated = along(base, &meanings).unwrap_or_default();
-        let states = states.into_iter().zip(simulated).filter_map(|(name, x)| Self::new(name, true, x));
+        let states = states.into_iter().zip(simulated).filter_map(|(name, x)| Self::new(simulation, name, x));
         inputs.chain(states).collect()
     }
 
     /// `None` where the signal does not move.
-    fn new(symbol: &str, state: bool, mut series: Series) -> Option<Self> {
+    fn new(simulation: &Simulation, symbol: &str, mut series: Series) -> Option<Self> {
+        let state = simulation.state(symbol).is_some();
+        let unit = simulation.unit_of(symbol).filter(|u| !u.is_none());
         let text = if state { held_beyond(Expr::symbol(symbol), &series) } else { Expr::symbol(symbol) };
         let (mean, deviation) = moments(&series);
         series.iter_mut().flatten().for_each(|x| *x = (*x - mean) / deviation);
@@ -89,6 +93,7 @@ impl Signal {
         moves.then(|| Self {
             symbol: symbol.to_owned(),
             state,
+            unit,
             text: text.to_string(),
             mean,
             deviation,
@@ -112,7 +117,7 @@ impl Signal {
 
     /// What parameters follow that follow it this way.
     pub fn followed(&self, way: Way) -> Followed {
-        let Self { symbol, state, text, mean, deviation, courses: [z, _] } = self;
+        let Self { symbol, state, unit, text, mean, deviation, courses: [z, _] } = self;
         let (mean, deviation, courses) = match way {
             Way::Straight => (*mean, *deviation, vec![z.clone()]),
             Way::Squared => {
@@ -122,7 +127,8 @@ impl Signal {
             }
             Way::Curved => (*mean, *deviation, self.courses.to_vec()),
         };
-        Followed { symbol: symbol.clone(), state: *state, text: text.clone(), way, mean, deviation, courses }
+        let (symbol, unit, text) = (symbol.clone(), unit.clone(), text.clone());
+        Followed { symbol, state: *state, unit, text, way, mean, deviation, courses }
     }
 
     /// The responses to what is followed this way, of those to the two courses.
@@ -163,27 +169,32 @@ impl Followed {
     /// What it does to a parameter with this amplitude of the first course, in words.
     pub fn words(&self, amplitude: f64) -> String {
         let rises = if amplitude < 0.0 { "falls" } else { "rises" };
-        let of = if self.way == Way::Squared { "the square of " } else { "" };
-        let what = if self.state { "state" } else { "input" };
+        let what = format!("{} `{}`", if self.state { "state" } else { "input" }, self.symbol);
         let share = number(100.0 * (amplitude / self.deviation).abs());
-        let along = if self.way == Way::Curved { " at its mean, along a curve" } else { "" };
-        format!("{rises} with {of}the {what} `{}`, by {share} % of its value for each unit of it{along}", self.symbol)
+        let power = if self.way == Way::Squared { 2 } else { 1 };
+        let each = self.unit.as_ref().map_or("unit of it".into(), |u| u.power(power).to_string());
+        let by = format!("by {share} % of its value for each {each}");
+        match self.way {
+            Way::Straight => format!("{rises} with the {what}, {by}"),
+            Way::Squared => format!("{rises} with the square of the {what}, {by}"),
+            Way::Curved => format!("{rises} with the {what} along a curve, {by} at its mean"),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use hysid_plant::Simulation;
+    use hysid_plant::{Compiled, Drive, Run};
 
-    use super::Way;
+    use super::*;
     use crate::budget::Budget;
     use crate::model::Values;
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::openset::course::Course;
+    use crate::openset::factor::with_course;
     use crate::openset::modulation::modulated;
     use crate::openset::varying::{Varying, varying};
-    use crate::openset::written::with_course;
     use crate::oscillator::{normal, rms};
 
     /// What is found where both coefficients of a force are multiplied by a function of another input, and whether it answers as the truth does where it is
@@ -202,7 +213,7 @@ mod tests {
         let (setting, none) = calibrated(simulation, &data, NoiseKind::Coloured, &budget);
         let base = none.base;
         let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
-        let written = with_course(&base.document(), &found).unwrap();
+        let written = with_course(&base.document(), &found).swap_remove(0);
         let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
         (found, rms(&fit.fit.residual) < 1.05 * 0.1)
     }
@@ -215,7 +226,7 @@ mod tests {
         assert!(found.gain > 20.0 && answers, "{}", found.gain);
         let slope: f64 = found.amplitudes[0] / 0.5_f64.sqrt();
         assert!((slope - 0.05).abs() < 0.01, "{slope}");
-        assert!(found.words().starts_with("the parameter `f` rises with the input `i`, by "), "{}", found.words());
+        assert!(found.words().starts_with("the parameter `f` rises with the input `i`"), "{}", found.words());
     }
 
     #[test]
@@ -255,9 +266,81 @@ mod tests {
         let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
         let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
         assert_eq!((found.symbol.as_str(), input.symbol.as_str()), ("T", "q"), "{}", found.words());
-        let written = with_course(&base.document(), &found).unwrap();
+        let written = with_course(&base.document(), &found).swap_remove(0);
         let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
         let left = [&fit.fit, &base.fit].map(|f| rms(&f.residual));
         assert!(found.gain > 20.0 && left[0] < 0.5 * left[1], "{} {left:?}", found.gain);
+    }
+
+    const REACTOR: &str = "[time]\nperiod_s = 2.0\n[inputs]\nT_j = \"jacket_K\"\n[parameters]\nk = { value = 0.03, min = 0.005, max = 0.2, unit = \"1/s\" }\n\
+                           h = { value = 60.0, min = 20.0, max = 200.0, unit = \"K\" }\nU = { value = 0.02, min = 0.005, max = 0.1, unit = \"1/s\" }\n[states]\n\
+                           c = { derivative = \"0.02*(1 - c) - k*c\", initial = 0.5 }\n\
+                           T = { derivative = \"h*k*c - U*(T - T_j)\", initial = 0.0, unit = \"K\" }\n[outputs]\nshare = \"c\"\nreactor_K = \"T\"\n";
+
+    /// What is found around a reactor whose rate depends so on its temperature, and what is left where it is written, over what was left before.
+    fn reaction(factor: &str) -> (Varying, f64) {
+        let original = Simulation::parse(REACTOR, "reactor.sim.toml").unwrap();
+        let mut truth = original.clone();
+        let by = Expr::parse(&format!("k*({factor})")).unwrap();
+        truth.states.iter_mut().for_each(|s| s.derivative = s.derivative.substitute("k", &by));
+        let mut random = normal(7);
+        let steps: Vec<f64> = (0..30).map(|_| 15.0 * random()).collect();
+        let jacket: Vec<f64> = (0..1200).map(|n| steps[n / 40]).collect();
+        let compiled = Compiled::new(&truth).unwrap();
+        let drive = Drive::new(0.0, 2.0, jacket.len(), vec![jacket.clone()]).unwrap();
+        let mut outputs = compiled.simulate(&Run::new(&drive, &compiled.theta())).outputs;
+        for y in &mut outputs {
+            let size = 0.01 * rms(y);
+            y.iter_mut().for_each(|y| *y += size * random());
+        }
+        let [share, reactor] = <[Vec<f64>; 2]>::try_from(outputs).unwrap();
+        let data = recorded(&original, 2.0, [("jacket_K", jacket), ("share", share), ("reactor_K", reactor)]);
+        let budget = Budget::new(&|_| false);
+        let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
+        let base = none.base;
+        let found = varying(&base, NoiseKind::White(1.0), std::slice::from_ref(&base.whitener)).unwrap();
+        let forms = with_course(&base.document(), &found);
+        let fits = forms.iter().filter_map(|form| setting.fit(form, &Values::default(), None, 2, 25));
+        let left = fits.map(|f| rms(&f.fit.residual)).fold(f64::INFINITY, f64::min) / rms(&base.fit.residual);
+        (found, left)
+    }
+
+    #[test]
+    fn a_rate_that_depends_on_a_state_is_found_in_all_equations_at_once() {
+        let (found, left) = reaction("exp(0.03*T)");
+        let Course::Follows(state) = &found.course else { panic!("{}", found.words()) };
+        assert_eq!((found.symbol.as_str(), state.symbol.as_str(), state.state), ("k", "T", true), "{}", found.words());
+        assert!(found.gain > 100.0 && left < 0.3, "{} {left}", found.gain);
+        let words = found.words();
+        assert!(
+            words.starts_with("the parameter `k` rises with the state `T`") && words.contains(" for each K"),
+            "{words}"
+        );
+        let (found, _) = reaction("1");
+        assert!(found.gain < 5.0, "{} {}", found.gain, found.words());
+    }
+
+    #[test]
+    fn the_square_is_made_of_the_two_courses() {
+        let simulation = Simulation::parse(REACTOR, "reactor.sim.toml").unwrap();
+        let series = vec![vec![1.0, 4.0, -2.0], vec![3.0, 0.5]];
+        let signal = Signal::new(&simulation, "T", series.clone()).unwrap();
+        let squared = signal.followed(Way::Squared);
+        let flat = |s: &Series| s.concat();
+        let raised: Vec<f64> = flat(&series).iter().map(|x| x * x).collect();
+        let mean = raised.iter().sum::<f64>() / 5.0;
+        let deviation = (raised.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 5.0).sqrt();
+        for (x, course) in raised.iter().zip(flat(&squared.courses[0])) {
+            assert!(((x - mean) / deviation - course).abs() < 1e-12);
+        }
+        // Responses are linear in what they answer to.
+        let [one, two] = signal.courses.each_ref().map(flat);
+        let response = signal.responses(Way::Squared, [&one, &two]);
+        assert!(response[0].iter().zip(flat(&squared.courses[0])).all(|(a, b)| (a - b).abs() < 1e-12));
+        // Written, it is the same number.
+        let held = Expr::parse("min(max(T, -5), 7)").unwrap();
+        let text = Expr::parse(&squared.texts()[0]).unwrap().replace(&held, &Expr::Number(4.0)).simplified();
+        let quotient: Vec<f64> = text.to_string().split('/').map(|n| n.parse().unwrap()).collect();
+        assert!((quotient[0] / quotient[1] - squared.courses[0][0][1]).abs() < 1e-9);
     }
 }

@@ -10,6 +10,7 @@
 //! MSSP 75 (2016): memory without rate needs an operator with memory, which no static term imitates.
 
 mod course;
+mod factor;
 mod followed;
 mod modulation;
 pub mod needed;
@@ -34,13 +35,14 @@ use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use course::Course;
+use factor::with_course;
 use regress::regress;
 use shapes::Kind;
 use signature::signature;
 use terms::{Term, terms};
 use varying::{Varying, varying};
 use view::View;
-use written::{Sparse, with_course};
+use written::Sparse;
 
 /// A correction with what decides whether it is believed.
 #[derive(Debug, Clone)]
@@ -94,8 +96,8 @@ impl OpenSet {
 pub enum Writable {
     /// Generic terms.
     Sparse(Sparse),
-    /// The simulation with a parameter that oscillates or follows an input.
-    Varying(Simulation),
+    /// The simulation with a parameter that oscillates or follows a signal, in one form or another.
+    Varying(Vec<Simulation>),
 }
 
 /// Most terms of a correction.
@@ -216,7 +218,7 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),
         gain: found.gain,
         choice: found.choice,
-        writable: with_course(&base.document(), &found).map(Writable::Varying),
+        writable: Some(with_course(&base.document(), &found)).filter(|w| !w.is_empty()).map(Writable::Varying),
         words: Some(found.words()),
         rival: None,
     }

@@ -52,8 +52,9 @@ pub fn likelier<'d>(
 /// log evidence without them.
 fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable, least: f64) -> Option<Refitted<'d>> {
     let sparse = match writable {
-        Writable::Varying(simulation) => {
-            let hypothesis = fit(setting, parent, &parent.base.values(), simulation)?;
+        Writable::Varying(forms) => {
+            let fits = forms.iter().filter_map(|form| fit(setting, parent, &parent.base.values(), form));
+            let hypothesis = fits.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
             return Some(Refitted { hypothesis, terms: Vec::new(), slot: None });
         }
         Writable::Sparse(sparse) => sparse.clone(),

@@ -28,7 +28,7 @@ const LINES: (usize, usize) = (4, 2);
 /// Scores of noise against which those of the residual are held, and the stream that it is drawn from.
 const NOISES: usize = 7;
 const STREAM: u64 = 0x7 << 56;
-/// Walks, and parameters that follow an input, that are judged with a noise model of their own.
+/// Walks, and parameters that follow a signal, that are judged with a noise model of their own.
 const WALKS: usize = 2;
 const FOLLOWING: usize = 2;
 /// Rounds of amplitudes and noise by turns.
@@ -186,17 +186,16 @@ fn pairs<'s>(machine: &Modulated<'_>, symbols: &[String], signals: &'s [Signal])
 
 /// The parameters that explain most under this noise where they follow a signal.
 fn likely_to_follow(view: &View<'_>, pairs: &[Pair<'_>]) -> Vec<Candidate> {
-    let mut gains: Vec<(f64, &Pair<'_>, Way)> = pairs
-        .par_iter()
-        .flat_map_iter(|pair| Way::ALL.map(|way| (view.free_gain(&pair.columns(way)), pair, way)))
-        .collect();
+    let gain = |pair: &Pair<'_>, way: Way| view.free_gain(&pair.columns(way));
+    // The square or the signal itself is what a curve is at best.
+    let mut gains: Vec<(f64, &Pair<'_>)> = pairs.par_iter().map(|pair| (gain(pair, Way::Curved), pair)).collect();
     gains.sort_by(|a, b| b.0.total_cmp(&a.0));
     gains.truncate(FOLLOWING);
-    let candidate = |(gain, pair, way): (f64, &Pair<'_>, Way)| {
+    let candidate = |pair: &Pair<'_>, way: Way| {
         let course = Course::Follows(pair.signal.followed(way));
-        Candidate { symbol: pair.symbol, course, columns: pair.columns(way), gain }
+        Candidate { symbol: pair.symbol, course, columns: pair.columns(way), gain: gain(pair, way) }
     };
-    gains.into_iter().map(candidate).collect()
+    gains.into_iter().flat_map(|(_, pair)| Way::ALL.map(|way| candidate(pair, way))).collect()
 }
 
 /// The lines of the parameters' scores that explain most under this noise.

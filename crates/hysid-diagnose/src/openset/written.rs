@@ -3,18 +3,13 @@
 //! Regression on the tangent chose the terms out of a coarse grid. A wave number that is a tenth wrong is out of phase at the end of the range,
 //! and what was better on the recording is then worse on another: all of it is refitted.
 
-use std::f64::consts::TAU;
-
 use hysid_plant::{BinaryOp, Expr, Function, Memory, Parameter, Simulation, Slot as Place};
 
-use super::course::{Course, phases};
-use super::modulation::multiply;
 use super::terms::{Coordinate, Term, measured};
-use super::varying::Varying;
 use crate::text::number;
 
 /// How far a coefficient may move from where the regression on the tangent found it, over its own size.
-const REACH: f64 = 10.0;
+pub const REACH: f64 = 10.0;
 /// How far a shape may move, as multiples of where it began.
 const SHAPES: (f64, f64) = (0.5, 2.0);
 /// Numbers that are part of a term's form.
@@ -172,35 +167,6 @@ fn held<'t>(terms: &[(&'t Term, f64)]) -> Option<Vec<&'t Expr>> {
 /// Whether a term is a coordinate as it was some time ago.
 fn is_past(text: &Expr) -> bool {
     matches!(text, Expr::Memory(Memory::Delay, _))
-}
-
-/// Share of a cycle over the recording by which a frequency may move from where the periodogram found it.
-const CYCLES: f64 = 0.75;
-
-/// A simulation in which a parameter oscillates, amplitudes and frequency unknown, or follows an input; `None` for a walk, since another recording sees
-/// another one.
-pub fn with_course(simulation: &Simulation, found: &Varying) -> Option<Simulation> {
-    let mut written = simulation.clone();
-    let texts = match &found.course {
-        Course::Walk(_) => return None,
-        Course::Line(f) => {
-            let frequency = written.fresh_symbol("s");
-            let (w, far) = (TAU * f, TAU * CYCLES / found.length_s);
-            written.parameters.push(Parameter::new(&frequency, w).within(w - far, w + far));
-            phases(&frequency).to_vec()
-        }
-        Course::Follows(_) => found.texts.clone(),
-    };
-    let mut factor = Expr::Number(1.0);
-    for (text, amplitude) in texts.iter().zip(&found.amplitudes) {
-        let course = Expr::parse(text).ok()?;
-        let name = written.fresh_symbol("g");
-        let reach = REACH * found.size;
-        written.parameters.push(Parameter::new(&name, *amplitude).within(-reach, reach));
-        factor = factor + Expr::symbol(&name) * course;
-    }
-    multiply(&mut written, &found.symbol, &factor);
-    Some(written)
 }
 
 /// A term over the simulation's symbols, the numbers in it parameters; exponents, zero and one are part of its form.
