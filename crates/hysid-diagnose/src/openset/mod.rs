@@ -60,13 +60,9 @@ pub struct OpenSet {
     pub writable: Option<Writable>,
     /// What it says in words, where it says more than that something is missing.
     pub words: Option<String>,
-    /// A parameter that varies, beside terms that gain more on the tangent: it is one law where it takes many terms to tell it, and stands before the
-    /// eyes only once it is fitted.
+    /// Terms beside a parameter that varies, or the other way round, where that gains less on the tangent.
     pub rival: Option<Box<OpenSet>>,
 }
-
-/// Share of the gain of terms from which a parameter that varies is their rival.
-const RIVAL: f64 = 0.5;
 
 /// Odds against a mismatch before the recording is looked at. The noise model is an estimate: on recordings in which nothing is missing the best
 /// of the sets gains more than chance alone would give it, and the odds must allow for that.
@@ -126,14 +122,13 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
     let chosen = noises.iter().filter_map(|noise| choose(base, kind, &terms, noise, none));
     let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
-    let Some(sparse) = sparse else { return varying(base, kind, &noises).map(|v| of_varying(base, v)) };
-    match varying(base, kind, &noises) {
-        Some(varying) if varying.gain > sparse.gain => Some(of_varying(base, varying)),
-        varying => {
-            let near = varying.filter(|v| v.gain > RIVAL * sparse.gain).map(|v| of_varying(base, v));
-            let rival = near.filter(|v| v.writable.is_some()).map(Box::new);
-            Some(OpenSet { rival, ..of_terms(base, &terms, sparse) })
-        }
+    let terms = sparse.map(|sparse| of_terms(base, &terms, sparse));
+    let varying = varying(base, kind, &noises).map(|found| of_varying(base, found));
+    let beside = |first: OpenSet, rival: OpenSet| OpenSet { rival: Some(Box::new(rival)), ..first };
+    match (terms, varying) {
+        (Some(terms), Some(varying)) if varying.gain > terms.gain => Some(beside(varying, terms)),
+        (Some(terms), Some(varying)) => Some(beside(terms, varying)),
+        (terms, varying) => terms.or(varying),
     }
 }
 

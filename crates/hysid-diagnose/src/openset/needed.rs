@@ -35,6 +35,10 @@ struct Fit<'d> {
     hypothesis: Hypothesis<'d>,
 }
 
+/// Share of a correction's gain on the tangent from which its rival is fitted too: a parameter that varies is one law where it takes many terms to tell it,
+/// of which the tangent shows but a part, and is one fit; terms take many.
+const RIVAL: (f64, f64) = (0.5, 0.9);
+
 /// A correction as [`fitted`], or the rival of it, whichever has more evidence once it stands in the equations, with what the tangent said of that.
 pub fn likelier<'d>(
     setting: &Setting<'d>,
@@ -43,8 +47,12 @@ pub fn likelier<'d>(
     least: f64,
 ) -> Option<(Refitted<'d>, OpenSet)> {
     let of = |o: &OpenSet| Some((fitted(setting, parent, o.writable.as_ref()?, least)?, o.clone()));
+    let likely = |rival: &&OpenSet| {
+        let share = if matches!(rival.writable, Some(Writable::Varying(_))) { RIVAL.0 } else { RIVAL.1 };
+        rival.gain > share * open.gain
+    };
     let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - o.choice;
-    let both = [of(open), open.rival.as_deref().and_then(of)];
+    let both = [of(open), open.rival.as_deref().filter(likely).and_then(of)];
     both.into_iter().flatten().max_by(|a, b| lead(a).total_cmp(&lead(b)))
 }
 
@@ -122,11 +130,16 @@ fn with_more<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, best: &Fit<'d>)
     if setting.budget.omits(Step::Terms) {
         return None;
     }
-    let open = correction(&best.hypothesis.base, setting.noise).filter(|o| o.gain > 0.0)?;
-    let Writable::Sparse(more) = open.writable? else { return None };
+    let mut open = correction(&best.hypothesis.base, setting.noise)?;
+    let rival = open.rival.take().map(|rival| *rival);
+    let terms = |o: OpenSet| match o.writable {
+        Some(Writable::Sparse(terms)) if o.gain > 0.0 => Some((terms, o.choice)),
+        _ => None,
+    };
+    let (more, choice) = [Some(open), rival].into_iter().flatten().find_map(terms)?;
     let longer = best.sparse.with(&fitted_values(best)?, &more);
     let longer = pruned(setting, parent, longer, &best.hypothesis.base.values())?;
-    (longer.hypothesis.log_evidence > best.hypothesis.log_evidence + open.choice).then_some(longer)
+    (longer.hypothesis.log_evidence > best.hypothesis.log_evidence + choice).then_some(longer)
 }
 
 /// Where each term's own parameters were fitted to.
