@@ -106,9 +106,9 @@ fn same(whole: &Expr, a: &Expr, left: Option<Unit>, b: &Expr, right: Option<Unit
 }
 
 /// The unit of a sum of which only one side is known. An angle is a pure number with a name: a lift coefficient may hold `C_q*d(alpha)`, in radians, and is no
-/// angle for that.
+/// angle for that. What is told for each degree stays so.
 fn beside_unknown(known: Unit, other: &Expr) -> Unit {
-    let angle = known.same_dimension(&Unit::none());
+    let angle = known.same_dimension(&Unit::none()) && !known.is_for_each();
     if angle && !matches!(other, Expr::Number(_)) { Unit::none() } else { known }
 }
 
@@ -192,5 +192,7 @@ mod tests {
         // A literal takes the unit of what it is added to, as before, and what is no angle tells what it is.
         assert_eq!(unit("g*a + 0.1").as_deref(), Some("rad"));
         assert_eq!(unit("d(a) + a/2").as_deref(), Some("rad/s"));
+        // A slope of which a part is unknown is one.
+        assert_eq!(unit("a*(C + 0.5*C*(1 - tanh(a)))").as_deref(), Some("-"));
     }
 }

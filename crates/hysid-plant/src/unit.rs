@@ -157,6 +157,11 @@ impl Unit {
         self.factors.is_empty()
     }
 
+    /// Whether it is told for each of something, and of nothing else (`1/deg`).
+    pub(crate) fn is_for_each(&self) -> bool {
+        !self.factors.is_empty() && self.factors.iter().all(|(_, exponent)| *exponent < 0)
+    }
+
     fn dimension(&self) -> (Dimension, BTreeMap<&str, i32>) {
         let mut known = Dimension::new();
         let mut unknown = BTreeMap::new();
