@@ -38,18 +38,25 @@ pub(super) fn renewed(part: Expr, before: &Expr, after: &Expr) -> Expr {
     }
 }
 
-/// Whether a product has this factor.
+/// Whether a product or quotient, of either sign, has this factor above its line.
 fn has_factor(product: &Expr, factor: &Expr) -> bool {
-    product == factor
-        || matches!(product, Expr::Binary(BinaryOp::Mul, a, b) if has_factor(a, factor) || has_factor(b, factor))
+    let within = |part: &Expr| has_factor(part, factor);
+    match product {
+        _ if product == factor => true,
+        Expr::Binary(BinaryOp::Mul, a, b) => within(a) || within(b),
+        Expr::Binary(BinaryOp::Div, a, _) | Expr::Neg(a) => within(a),
+        _ => false,
+    }
 }
 
-/// A product with another factor in the place of this one, which it has.
+/// A product or quotient with another factor in the place of this one, which it has.
 fn with_factor(product: &Expr, factor: &Expr, by: &Expr) -> Expr {
     match product {
         _ if product == factor => by.clone(),
         Expr::Binary(BinaryOp::Mul, a, b) if has_factor(a, factor) => with_factor(a, factor, by) * (**b).clone(),
         Expr::Binary(BinaryOp::Mul, a, b) => (**a).clone() * with_factor(b, factor, by),
+        Expr::Binary(BinaryOp::Div, a, b) => with_factor(a, factor, by) / (**b).clone(),
+        Expr::Neg(a) => -with_factor(a, factor, by),
         other => other.clone(),
     }
 }
@@ -79,6 +86,8 @@ mod tests {
         let (before, after) = ("(F - c*v)/M", "(F - c*v - h)/M");
         check(before, after, "-(9.81*q + (F - c*v)/M)/L", "-(9.81*q + (F - c*v - h)/M)/L");
         check(before, after, "-cos(q)*(F - c*v)/(M*L) - q", "-cos(q)*(F - c*v - h)/(M*L) - q");
+        check(before, after, "-(F - c*v)/M/L - q", "-(F - c*v - h)/M/L - q");
+        check(before, after, "q*(F - c*v)/L/M - q", "q*(F - c*v - h)/L/M - q");
         // The same sum over another mass is another force.
         check(before, after, "(F - c*v)/L - q", "(F - c*v)/L - q");
         check(before, "(F - c*v - h)/(M + m)", "(F - c*v)/(M*L)", "(F - c*v - h)/((M + m)*L)");
