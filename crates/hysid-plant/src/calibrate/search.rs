@@ -146,7 +146,9 @@ impl Compiled {
                 witnesses += usize::from(!start.identified);
                 let relative = (2.0 * least / samples as f64).sqrt();
                 let explained = start.is_explained(best, short, white);
-                if best <= 1.01 * least && ((relative < 0.03 && found.len() > 2) || explained || (agreed && witnesses > 0)) {
+                if best <= 1.01 * least
+                    && ((relative < 0.03 && found.len() > 2) || explained || (agreed && witnesses > 0))
+                {
                     break;
                 }
             }

@@ -26,7 +26,7 @@ pub static BILINEAR_STIFFNESS: Mechanism = Mechanism {
     contains: &[],
     confusable: &["quadratic_stiffness", "gap_stop"],
     needs: &[Need::BothSides("x")],
-    sentence: "The spring {place} changes its stiffness by {k_b}[ at {x_0}].",
+    sentence: "The spring {place} is {|k_b|} {k_b:stiffer/softer} above[ {x_0}] than below.",
     signature: "Even and odd harmonics, sub-harmonics; a knee on one side.",
     reference: "S. W. Shaw, P. J. Holmes, A periodically forced piecewise linear oscillator, J. Sound Vib. 90 (1983) 129-155",
 };
