@@ -1,6 +1,6 @@
 //! What a parameter may follow: a recorded input, or a state of the simulation, as a reaction's rate does the temperature.
 
-use hysid_plant::{Expr, Simulation, Unit};
+use hysid_plant::{Expr, Simulation, State, Unit};
 
 use super::course::Series;
 use super::sites::OTHERS;
@@ -32,6 +32,8 @@ pub struct Signal {
     symbol: String,
     /// Whether it is a state, and no input.
     state: bool,
+    /// The parts that move, where it is a coordinate or the velocity of one.
+    moved: Option<Vec<String>>,
     unit: Option<Unit>,
     /// As it is written: a state not further than it was seen to go.
     text: String,
@@ -59,16 +61,11 @@ pub struct Followed {
 
 impl Signal {
     /// All that a parameter of a fitted simulation may follow: what is recorded besides the one input that drives it, the states, but no prescribed motion. A
-    /// parameter that follows that is a curved law, which has terms of its own.
+    /// parameter that follows that is a curved law, which has terms of its own ([`Self::leads`]).
     pub fn all(base: &Base<'_>) -> Vec<Self> {
         let simulation = base.model.simulation();
         let structure = Structure::of(simulation);
-        let laws = structure.slots.iter().filter(|s| s.place == Place::ForceLaw);
-        let motion: Vec<String> = laws
-            .flat_map(|s| ["x", "v"].map(|n| s.quantity(n)))
-            .flatten()
-            .flat_map(|q| q.expression.symbols())
-            .collect();
+        let motion = motion_in(&structure, &[Place::ForceLaw]);
         let several = simulation.inputs.len() > 1;
         let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| several && !motion.contains(&u.symbol));
         let recorded = |i: usize| base.model.data().stretches.iter().map(|s| s.drive.inputs()[i].clone()).collect();
@@ -77,8 +74,14 @@ impl Signal {
         let states: Vec<&String> = states.collect();
         let meanings: Vec<Expr> = states.iter().map(|s| Expr::symbol(*s)).collect();
         let simulated = along(base, &meanings).unwrap_or_default();
-        let states = states.into_iter().zip(simulated).filter_map(|(name, x)| Self::new(simulation, name, x));
-        inputs.chain(states).collect()
+        let own = motion_in(&structure, &[Place::Force, Place::Connection]);
+        let parts = structure.slots.iter().filter(|s| s.place == Place::Force);
+        let parts: Vec<String> = parts.filter_map(|s| Some(s.label.strip_prefix("state:")?.to_owned())).collect();
+        let of_state = |(name, x): (&String, Series)| {
+            let moved = own.contains(name).then(|| parts.clone());
+            Some(Self { moved, ..Self::new(simulation, name, x)? })
+        };
+        inputs.chain(states.into_iter().zip(simulated).filter_map(of_state)).collect()
     }
 
     /// `None` where the signal does not move.
@@ -93,6 +96,7 @@ impl Signal {
         moves.then(|| Self {
             symbol: symbol.to_owned(),
             state,
+            moved: None,
             unit,
             text: text.to_string(),
             mean,
@@ -117,7 +121,7 @@ impl Signal {
 
     /// What parameters follow that follow it this way.
     pub fn followed(&self, way: Way) -> Followed {
-        let Self { symbol, state, unit, text, mean, deviation, courses: [z, _] } = self;
+        let Self { symbol, state, unit, text, mean, deviation, courses: [z, _], .. } = self;
         let (mean, deviation, courses) = match way {
             Way::Straight => (*mean, *deviation, vec![z.clone()]),
             Way::Squared => {
@@ -143,10 +147,20 @@ impl Signal {
         }
     }
 
-    /// Whether it is this symbol.
-    pub fn is(&self, symbol: &str) -> bool {
-        self.symbol == symbol
+    /// Whether a parameter or an input may follow it. One that stands among the forces on what moves, and nowhere else, and follows the motion is a curved law:
+    /// a damping that is stronger near the ends of a travel, where the speed is low, is what a dry friction looks like.
+    pub fn leads(&self, simulation: &Simulation, symbol: &str) -> bool {
+        let Some(parts) = &self.moved else { return self.symbol != symbol };
+        let is_force = |s: &State| !s.derivative.uses(symbol) || parts.contains(&s.name);
+        simulation.outputs.iter().any(|o| o.expression.uses(symbol)) || !simulation.states.iter().all(is_force)
     }
+}
+
+/// What the coordinates and velocities at slots of these places are made of.
+fn motion_in(structure: &Structure, places: &[Place]) -> Vec<String> {
+    let slots = structure.slots.iter().filter(|s| places.contains(&s.place));
+    let quantities = slots.flat_map(|s| ["x", "v"].map(|n| s.quantity(n))).flatten();
+    quantities.flat_map(|q| q.expression.symbols()).collect()
 }
 
 /// Mean and standard deviation.
@@ -342,5 +356,27 @@ mod tests {
         let text = Expr::parse(&squared.texts()[0]).unwrap().replace(&held, &Expr::Number(4.0)).simplified();
         let quotient: Vec<f64> = text.to_string().split('/').map(|n| n.parse().unwrap()).collect();
         assert!((quotient[0] / quotient[1] - squared.courses[0][0][1]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_force_that_follows_its_motion_is_a_law() {
+        let text = "[time]\nperiod_s = 0.01\n[inputs]\nu = \"drive_V\"\n[parameters]\nB = { value = 5.0, min = 0.5, unit = \"N/A\" }\nR = { value = 4.0, min = 0.4, unit = \"ohm\" }\n\
+                    L = { value = 0.1, min = 0.01, unit = \"H\" }\nk = { value = 80.0, min = 8.0, unit = \"N/m\" }\nc = { value = 2.0, min = 0.2, unit = \"N s/m\" }\n[states]\n\
+                    i = { derivative = \"(u - R*i - B*v)/L\", initial = 0.0, unit = \"A\" }\nx = { derivative = \"v\", initial = 0.0, unit = \"m\" }\n\
+                    v = { derivative = \"(B*i - c*v - k*x)/0.5\", initial = 0.0, unit = \"m/s\" }\n[outputs]\nx_m = \"x\"\n";
+        let simulation = Simulation::parse(text, "coil.sim.toml").unwrap();
+        let mut random = normal(2);
+        let u: Vec<f64> = (0..300).map(|_| random()).collect();
+        let x = u.iter().map(|u| 0.1 * u + 0.01 * random()).collect();
+        let data = recorded(&simulation, 0.01, [("drive_V", u), ("x_m", x)]);
+        let budget = Budget::new(&|_| false);
+        let base = calibrated(simulation, &data, NoiseKind::White(1.0), &budget).1.base;
+        let simulation = base.model.simulation();
+        let signals = Signal::all(&base);
+        let leads =
+            |signal: &str, symbol: &str| signals.iter().find(|s| s.symbol == signal).unwrap().leads(simulation, symbol);
+        // The force factor stands in the winding too, and a current is no motion.
+        let found = [("x", "k"), ("x", "c"), ("v", "c"), ("x", "B"), ("i", "B"), ("i", "c"), ("x", "R")];
+        assert_eq!(found.map(|(s, p)| leads(s, p)), [false, false, false, true, true, true, true]);
     }
 }

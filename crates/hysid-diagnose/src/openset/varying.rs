@@ -8,6 +8,7 @@
 
 use std::f64::consts::SQRT_2;
 
+use hysid_plant::Simulation;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
@@ -120,7 +121,7 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<
     let of_walks: Vec<Option<Vec<Vec<f64>>>> =
         machine.responses(&requests).chunks(COURSES).map(|some| some.iter().cloned().collect()).collect();
     let signals = Signal::all(base);
-    let pairs = pairs(&machine, &symbols, &signals);
+    let pairs = pairs(base.model.simulation(), &machine, &symbols, &signals);
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
     let mut best: Option<Varying> = None;
     for noise in noises {
@@ -171,9 +172,14 @@ impl Pair<'_> {
 }
 
 /// Every symbol with every signal that it may follow.
-fn pairs<'s>(machine: &Modulated<'_>, symbols: &[String], signals: &'s [Signal]) -> Vec<Pair<'s>> {
+fn pairs<'s>(
+    simulation: &Simulation,
+    machine: &Modulated<'_>,
+    symbols: &[String],
+    signals: &'s [Signal],
+) -> Vec<Pair<'s>> {
     let pairs = signals.iter().flat_map(|s| (0..symbols.len()).map(move |i| (i, s)));
-    let pairs: Vec<(usize, &Signal)> = pairs.filter(|(i, s)| !s.is(&symbols[*i])).collect();
+    let pairs: Vec<(usize, &Signal)> = pairs.filter(|(i, s)| s.leads(simulation, &symbols[*i])).collect();
     let courses = |(i, s): &(usize, &Signal)| s.courses.clone().map(|c| (*i, c));
     let requests: Vec<(usize, Series)> = pairs.iter().flat_map(courses).collect();
     let mut responses = machine.responses(&requests).into_iter();
@@ -186,16 +192,16 @@ fn pairs<'s>(machine: &Modulated<'_>, symbols: &[String], signals: &'s [Signal])
 
 /// The parameters that explain most under this noise where they follow a signal.
 fn likely_to_follow(view: &View<'_>, pairs: &[Pair<'_>]) -> Vec<Candidate> {
-    let gain = |pair: &Pair<'_>, way: Way| view.free_gain(&pair.columns(way));
-    // The square or the signal itself is what a curve is at best.
-    let mut gains: Vec<(f64, &Pair<'_>)> = pairs.par_iter().map(|pair| (gain(pair, Way::Curved), pair)).collect();
+    // The signal itself or its square is a curve, too.
+    let gain = |pair: &Pair<'_>| view.free_gain(&pair.columns(Way::Curved));
+    let mut gains: Vec<(f64, &Pair<'_>)> = pairs.par_iter().map(|pair| (gain(pair), pair)).collect();
     gains.sort_by(|a, b| b.0.total_cmp(&a.0));
     gains.truncate(FOLLOWING);
-    let candidate = |pair: &Pair<'_>, way: Way| {
+    let candidate = |(gain, pair): (f64, &Pair<'_>), way: Way| {
         let course = Course::Follows(pair.signal.followed(way));
-        Candidate { symbol: pair.symbol, course, columns: pair.columns(way), gain: gain(pair, way) }
+        Candidate { symbol: pair.symbol, course, columns: pair.columns(way), gain }
     };
-    gains.into_iter().flat_map(|(_, pair)| Way::ALL.map(|way| candidate(pair, way))).collect()
+    gains.into_iter().flat_map(|likely| Way::ALL.map(|way| candidate(likely, way))).collect()
 }
 
 /// The lines of the parameters' scores that explain most under this noise.

@@ -183,3 +183,45 @@ fn a_gap_in_the_measurement_gives_no_start() {
     let core = Core::new(&compiled, &data, &estimated, &user, &[], 1).expect("linear");
     assert!(core.by_identification(1).0.is_empty());
 }
+
+/// The position loop of a belt axis whose motor sticks in the pauses of a reference that ramps and holds.
+const BELT: &str = r#"
+[time]
+period_s = 0.002
+[inputs]
+r = "ref_rad"
+[parameters]
+J1 = { value = 0.0031, min = 0.00093, max = 0.0093 }
+J2 = { value = 0.0067, min = 0.00201, max = 0.0201 }
+b1 = { value = 0.012, min = 0.0036, max = 0.036 }
+kt = { value = 38.0, min = 11.4, max = 114.0 }
+ct = { value = 0.02, min = 0.006, max = 0.06 }
+Tc = { value = 0.21, min = 0.0, max = 1.0 }
+[states]
+q1 = { derivative = "w1", initial = 0.0 }
+w1 = { derivative = "(5*(r - q1) - 0.16*w1 - b1*w1 - Tc*sign(w1) - kt*(q1 - q2) - ct*(w1 - w2))/J1", initial = 0.0 }
+q2 = { derivative = "w2", initial = 0.0 }
+w2 = { derivative = "(kt*(q1 - q2) + ct*(w1 - w2))/J2", initial = 0.0 }
+[outputs]
+motor_rad = "q1"
+torque_Nm = "5*(r - q1) - 0.16*w1"
+"#;
+
+#[test]
+fn a_position_loop_that_sticks_is_found_from_far_values() {
+    let targets = white_noise(20, 0.6, 5).expect("valid");
+    // Each target is reached in the first half of its 0.5 s.
+    let reference = |n: usize| {
+        let (at, share) = (n / 250, (n % 250) as f64 / 125.0);
+        let from = if at > 0 { targets[at - 1] } else { 0.0 };
+        from + (targets[at] - from) * 0.5 * (1.0 - (std::f64::consts::PI * share.min(1.0)).cos())
+    };
+    let data = data(&compile(BELT), vec![(0..5000).map(reference).collect()], 0.002, 0.012);
+    let far = wrong(BELT, &[1.2, 0.63, 1.33, 1.33, 1.3, 1.2]);
+    let settings = Settings { gls_rounds: 0, iterations: 40, ..Settings::default() };
+    let found = far.calibrate(&[data], &settings).expect("calibrated");
+    let truth = compile(BELT).theta();
+    for (i, (found, truth)) in found.theta.iter().zip(&truth).enumerate().filter(|(i, _)| *i < 4) {
+        assert!((found / truth - 1.0).abs() < 0.05, "parameter {i}: {found} for {truth}");
+    }
+}
