@@ -39,6 +39,8 @@ pub struct Signal {
     text: String,
     mean: f64,
     deviation: f64,
+    /// Standard deviation of its square from zero.
+    spread: f64,
     /// The signal and its square, both without their means.
     pub courses: [Series; 2],
 }
@@ -91,7 +93,10 @@ impl Signal {
         let text = if state { held_beyond(Expr::symbol(symbol), &series) } else { Expr::symbol(symbol) };
         let (mean, deviation) = moments(&series);
         series.iter_mut().flatten().for_each(|x| *x = (*x - mean) / deviation);
-        let square = series.iter().map(|s| s.iter().map(|x| x * x - 1.0).collect()).collect();
+        let square: Series = series.iter().map(|s| s.iter().map(|x| x * x - 1.0).collect()).collect();
+        let power = |(z, square): (&f64, &f64)| power(mean, deviation, *z, *square);
+        let powers = series.iter().zip(&square).map(|(z, s)| z.iter().zip(s).map(power).collect());
+        let spread = moments(&powers.collect()).1;
         let moves = deviation > 1e-9 * mean.abs() && deviation.is_finite();
         moves.then(|| Self {
             symbol: symbol.to_owned(),
@@ -101,33 +106,25 @@ impl Signal {
             text: text.to_string(),
             mean,
             deviation,
+            spread,
             courses: [series, square],
         })
     }
 
-    /// Its square from zero, by its two courses or by the responses to them.
+    /// Its square from zero in multiples of the standard deviation of that, by its two courses or by the responses to them.
     fn squared(&self, [z, square]: [&[f64]; 2]) -> Vec<f64> {
-        let Self { mean, deviation, .. } = self;
-        z.iter().zip(square).map(|(z, s)| deviation * (2.0 * mean * z + deviation * s)).collect()
-    }
-
-    /// The square from zero by stretch, and its standard deviation.
-    fn powers(&self) -> (Series, f64) {
-        let [z, square] = &self.courses;
-        let powers: Series = z.iter().zip(square).map(|(z, s)| self.squared([z, s])).collect();
-        let deviation = moments(&powers).1;
-        (powers, deviation)
+        let Self { mean, deviation, spread, .. } = self;
+        z.iter().zip(square).map(|(z, s)| power(*mean, *deviation, *z, *s) / spread).collect()
     }
 
     /// What parameters follow that follow it this way.
     pub fn followed(&self, way: Way) -> Followed {
-        let Self { symbol, state, unit, text, mean, deviation, courses: [z, _], .. } = self;
+        let Self { symbol, state, unit, text, mean, deviation, spread, courses: [z, square], .. } = self;
         let (mean, deviation, courses) = match way {
             Way::Straight => (*mean, *deviation, vec![z.clone()]),
             Way::Squared => {
-                let (mut powers, spread) = self.powers();
-                powers.iter_mut().flatten().for_each(|x| *x /= spread);
-                (mean * mean + deviation * deviation, spread, vec![powers])
+                let powers = z.iter().zip(square).map(|(z, s)| self.squared([z, s])).collect();
+                (mean * mean + deviation * deviation, *spread, vec![powers])
             }
             Way::Curved => (*mean, *deviation, self.courses.to_vec()),
         };
@@ -139,10 +136,7 @@ impl Signal {
     pub fn responses(&self, way: Way, [one, two]: [&[f64]; 2]) -> Vec<Vec<f64>> {
         match way {
             Way::Straight => vec![one.to_vec()],
-            Way::Squared => {
-                let spread = self.powers().1;
-                vec![self.squared([one, two]).into_iter().map(|x| x / spread).collect()]
-            }
+            Way::Squared => vec![self.squared([one, two])],
             Way::Curved => vec![one.to_vec(), two.to_vec()],
         }
     }
@@ -161,6 +155,11 @@ fn motion_in(structure: &Structure, places: &[Place]) -> Vec<String> {
     let slots = structure.slots.iter().filter(|s| places.contains(&s.place));
     let quantities = slots.flat_map(|s| ["x", "v"].map(|n| s.quantity(n))).flatten();
     quantities.flat_map(|q| q.expression.symbols()).collect()
+}
+
+/// The square from zero, but for its mean, of what is so many deviations from its mean, with the square of that less one.
+fn power(mean: f64, deviation: f64, z: f64, square: f64) -> f64 {
+    deviation * (2.0 * mean * z + deviation * square)
 }
 
 /// Mean and standard deviation.
@@ -240,7 +239,8 @@ mod tests {
         assert!(found.gain > 20.0 && answers, "{}", found.gain);
         let slope: f64 = found.amplitudes[0] / 0.5_f64.sqrt();
         assert!((slope - 0.05).abs() < 0.01, "{slope}");
-        assert!(found.words().starts_with("the parameter `f` rises with the input `i`"), "{}", found.words());
+        let words = found.words();
+        assert!(words.starts_with("the parameter `f` rises with the input `i` along a curve, by "), "{words}");
     }
 
     #[test]

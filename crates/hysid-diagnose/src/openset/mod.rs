@@ -60,7 +60,7 @@ pub struct OpenSet {
     pub writable: Option<Writable>,
     /// What it says in words, where it says more than that something is missing.
     pub words: Option<String>,
-    /// Terms beside a parameter that varies, or the other way round, where that gains less on the tangent.
+    /// Terms beside a parameter that varies, or the other way round, where that gains less on the tangent and can be written.
     pub rival: Option<Box<OpenSet>>,
 }
 
@@ -122,13 +122,18 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
     let chosen = noises.iter().filter_map(|noise| choose(base, kind, &terms, noise, none));
     let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
-    let terms = sparse.map(|sparse| of_terms(base, &terms, sparse));
-    let varying = varying(base, kind, &noises).map(|found| of_varying(base, found));
+    let of_sparse = |sparse: Chosen| of_terms(base, &terms, sparse);
     let beside = |first: OpenSet, rival: OpenSet| OpenSet { rival: Some(Box::new(rival)), ..first };
-    match (terms, varying) {
-        (Some(terms), Some(varying)) if varying.gain > terms.gain => Some(beside(varying, terms)),
-        (Some(terms), Some(varying)) => Some(beside(terms, varying)),
-        (terms, varying) => terms.or(varying),
+    match (sparse, varying(base, kind, &noises)) {
+        (Some(sparse), Some(varying)) if varying.gain > sparse.gain => {
+            Some(beside(of_varying(base, varying), of_sparse(sparse)))
+        }
+        // A walk cannot be written, and stands beside nothing.
+        (Some(sparse), Some(varying)) if !matches!(varying.course, Course::Walk(_)) => {
+            Some(beside(of_sparse(sparse), of_varying(base, varying)))
+        }
+        (Some(sparse), _) => Some(of_sparse(sparse)),
+        (None, varying) => varying.map(|found| of_varying(base, found)),
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Refitted<'d> {
     pub terms: Vec<TermRecord>,
     /// The slot of the loudest of them.
     pub slot: Option<String>,
+    /// What the tangent said of it.
+    pub of: OpenSet,
 }
 
 /// Times that terms are looked for around a correction that was refitted.
@@ -39,31 +41,30 @@ struct Fit<'d> {
 /// of which the tangent shows but a part, and is one fit; terms take many.
 const RIVAL: (f64, f64) = (0.5, 0.9);
 
-/// A correction as [`fitted`], or the rival of it, whichever has more evidence once it stands in the equations, with what the tangent said of that.
+/// A correction as [`fitted`], or the rival of it, whichever has more evidence once it stands in the equations.
 pub fn likelier<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'d>,
     open: &OpenSet,
     least: f64,
-) -> Option<(Refitted<'d>, OpenSet)> {
-    let of = |o: &OpenSet| Some((fitted(setting, parent, o.writable.as_ref()?, least)?, o.clone()));
+) -> Option<Refitted<'d>> {
     let likely = |rival: &&OpenSet| {
         let share = if matches!(rival.writable, Some(Writable::Varying(_))) { RIVAL.0 } else { RIVAL.1 };
         rival.gain > share * open.gain
     };
-    let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - o.choice;
-    let both = [of(open), open.rival.as_deref().filter(likely).and_then(of)];
-    both.into_iter().flatten().max_by(|a, b| lead(a).total_cmp(&lead(b)))
+    let both = std::iter::once(open).chain(open.rival.as_deref().filter(likely));
+    let lead = |r: &Refitted<'d>| r.hypothesis.log_evidence - r.of.choice;
+    both.filter_map(|o| fitted(setting, parent, o, least)).max_by(|a, b| lead(a).total_cmp(&lead(b)))
 }
 
 /// The correction fitted in the place of, or on top of, a set, without the terms that it does not need; further ones are looked for where it reaches this
 /// log evidence without them.
-fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writable, least: f64) -> Option<Refitted<'d>> {
-    let sparse = match writable {
+fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, open: &OpenSet, least: f64) -> Option<Refitted<'d>> {
+    let sparse = match open.writable.as_ref()? {
         Writable::Varying(forms) => {
             let fits = forms.iter().filter_map(|form| fit(setting, parent, &parent.base.values(), form));
             let hypothesis = fits.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-            return Some(Refitted { hypothesis, terms: Vec::new(), slot: None });
+            return Some(Refitted { hypothesis, terms: Vec::new(), slot: None, of: open.clone() });
         }
         Writable::Sparse(sparse) => sparse.clone(),
     };
@@ -78,7 +79,7 @@ fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, writable: &Writabl
     let terms = told(parent, &best)?;
     let loudest = terms.iter().zip(best.sparse.slots()).max_by(|(a, _), (b, _)| a.err.total_cmp(&b.err));
     let slot = loudest.map(|(_, slot)| slot.to_owned());
-    Some(Refitted { hypothesis: best.hypothesis, terms, slot })
+    Some(Refitted { hypothesis: best.hypothesis, terms, slot, of: open.clone() })
 }
 
 /// The terms of a correction as they were fitted, each with the share of the residual's power, before any of them, that it explains.

@@ -41,10 +41,10 @@ pub struct Remaining<'d> {
     open: Option<OpenSet>,
     /// The same in place of the set, where that explains far more.
     instead: Option<OpenSet>,
-    /// Generic terms in its place, refitted, where those explain far more, with what the tangent said of them.
-    swapped: Option<(Refitted<'d>, OpenSet)>,
+    /// Generic terms in its place, refitted, where those explain far more.
+    swapped: Option<Refitted<'d>>,
     /// The generic terms of the simulation without effects, refitted, where that was tried and did not explain far more.
-    tried: Option<(Refitted<'d>, OpenSet)>,
+    tried: Option<Refitted<'d>>,
     /// What is written into the simulation, as it was refitted.
     written: Option<CorrectionRecord>,
     /// Whether generic terms explain so much that the set is an imitation.
@@ -138,24 +138,20 @@ impl<'d> Remaining<'d> {
         let setting = &search.setting;
         let swapped = self.swapped.take();
         let replaced = swapped.is_some();
-        let (Refitted { hypothesis: best, terms, slot }, of, sure, on_top) = match swapped {
-            Some((refitted, of)) => (refitted, of, true, false),
+        let (refitted, on_top) = match swapped {
+            Some(refitted) => (refitted, false),
             None => {
-                let tried = self.tried.take();
                 let left = self.open.as_ref().filter(|_| trusted);
                 let on_top = left.and_then(|o| likelier(setting, &pool[winner], o, f64::NEG_INFINITY));
                 let generic = if winner > 0 { search.open(&pool[0]) } else { None };
-                let instead = tried.or_else(|| likelier(setting, &pool[0], generic.as_ref()?, f64::NEG_INFINITY));
-                let evidence = |(r, _): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence;
-                let first = match (&on_top, &instead) {
-                    (Some(a), Some(b)) => evidence(a) > evidence(b),
-                    (a, _) => a.is_some(),
-                };
-                let (refitted, of) = if first { on_top? } else { instead? };
-                let sure = self.stands_by_evidence(&of);
-                (refitted, of, sure, first)
+                let alone = || likelier(setting, &pool[0], generic.as_ref()?, f64::NEG_INFINITY);
+                let instead = self.tried.take().or_else(alone);
+                let both = on_top.map(|r| (r, true)).into_iter().chain(instead.map(|r| (r, false)));
+                both.max_by(|(a, _), (b, _)| a.hypothesis.log_evidence.total_cmp(&b.hypothesis.log_evidence))?
             }
         };
+        let Refitted { hypothesis: best, terms, slot, of } = refitted;
+        let sure = replaced || self.stands_by_evidence(&of);
         let driven = pool[otherwise].base.driven() && best.base.driven();
         if leaves_more(&best, &pool[otherwise]) && !driven {
             return None;
@@ -211,8 +207,7 @@ impl<'d> Remaining<'d> {
     }
 }
 
-/// Generic terms, refitted in the place of a set, that explain far more, with what the tangent said of them: those that the set leaves (`seen`) and
-/// those of the simulation without effects. Where none does, those of the simulation without effects as they were refitted, where that was tried.
+/// Generic terms, refitted in the place of a set, that explain far more: those that the set leaves (`seen`) and those of the simulation without effects. Where none does, those of the simulation without effects as they were refitted, where that was tried.
 ///
 /// Where the set is an imitation, what it leaves is a small part of what is really missing: the right term shows beside the wrong effects. The regression,
 /// which knows the simulation without effects only by its tangent, may choose another one there.
@@ -222,7 +217,7 @@ fn in_place<'d>(
     best: &Hypothesis<'d>,
     seen: Option<&OpenSet>,
     generic: Option<&OpenSet>,
-) -> (Option<(Refitted<'d>, OpenSet)>, Option<(Refitted<'d>, OpenSet)>) {
+) -> (Option<Refitted<'d>>, Option<Refitted<'d>>) {
     let explained = best.log_evidence - none.log_evidence;
     let halfway = none.log_evidence + HALFWAY * explained;
     let likely =
@@ -238,12 +233,12 @@ fn in_place<'d>(
         }
         Writable::Varying(_) => None,
     };
-    let lead = |(r, o): &(Refitted<'d>, OpenSet)| r.hypothesis.log_evidence - best.log_evidence - o.choice;
+    let lead = |r: &Refitted<'d>| r.hypothesis.log_evidence - best.log_evidence - r.of.choice;
     let (beside, alone) = (seen.and_then(beside), generic.filter(likely).and_then(refitted));
-    let leads = |swapped: &Option<(Refitted<'d>, OpenSet)>| swapped.as_ref().map(lead).filter(|l| *l > FAR_MORE);
+    let leads = |swapped: &Option<Refitted<'d>>| swapped.as_ref().map(lead).filter(|l| *l > FAR_MORE);
     match (leads(&beside), leads(&alone)) {
         // One that was left halfway is no correction yet.
-        (None, None) => (None, alone.filter(|(r, _)| r.hypothesis.log_evidence >= halfway)),
+        (None, None) => (None, alone.filter(|r| r.hypothesis.log_evidence >= halfway)),
         (Some(a), b) if b.is_none_or(|b| b < a) => (beside, None),
         _ => (alone, None),
     }

@@ -4,8 +4,8 @@
 //! transfer functions that are identified from the record (refined instrumental variables), the user's values, the linear core
 //! fitted to the measured frequency response, and a seeded design. The first are searched in free run; from each other one, a
 //! homotopy leads from prediction (an observer holds the simulation near the measurement, which makes the landscape nearly
-//! convex) to the free run. An error far below the signal, or two starts that agree on the best, end the search. The best is
-//! polished on all data. Coloured noise is weighted by an autoregression, in rounds of generalised least squares.
+//! convex) to the free run. An error far below the signal after three starts, or two starts that agree on the best, end the
+//! search. The best is polished on all data. Coloured noise is weighted by an autoregression, in rounds of generalised least squares.
 //!
 //! A stretch that diverges has infinite cost. Nothing here draws a conclusion from what remains: it returns the residuals.
 

@@ -15,6 +15,9 @@ use crate::engine::Compiled;
 
 /// Samples on which starts are compared.
 const SHORT: usize = 3000;
+/// Error over the signal from which on it is far below that, and the starts after which that ends the search: a closed loop that sticks has local minima
+/// with little error.
+const SMALL: (f64, usize) = (0.03, 3);
 /// Strengths of the observer on the way to the free run, and the free run alone.
 pub(super) const HOMOTOPY: &[f64] = &[1.0, 0.1, 0.01, 0.0];
 const FREE_RUN: &[f64] = &[0.0];
@@ -137,7 +140,7 @@ impl Compiled {
             simulations += objective.simulations;
             if best.is_finite() {
                 let theta = objective.theta(&p);
-                // Two starts that agree on the best so far, an error far below the signal, or as little as a linear model with
+                // Two starts that agree on the best so far, an error far below the signal after some starts, or as little as a linear model with
                 // free coefficients leaves, end the search.
                 let agreed =
                     found.iter().any(|(cost, known)| (best - cost).abs() <= 0.01 * cost && starts::same(known, &theta));
@@ -146,9 +149,8 @@ impl Compiled {
                 witnesses += usize::from(!start.identified);
                 let relative = (2.0 * least / samples as f64).sqrt();
                 let explained = start.is_explained(best, short, white);
-                if best <= 1.01 * least
-                    && ((relative < 0.03 && found.len() > 2) || explained || (agreed && witnesses > 0))
-                {
+                let small = relative < SMALL.0 && found.len() >= SMALL.1;
+                if best <= 1.01 * least && (small || explained || (agreed && witnesses > 0)) {
                     break;
                 }
             }
