@@ -54,7 +54,8 @@ pub struct Followed {
     pub state: bool,
     unit: Option<Unit>,
     text: String,
-    way: Way,
+    /// How it is followed.
+    pub way: Way,
     mean: f64,
     deviation: f64,
     /// The courses of a parameter that follows it, each with an amplitude of its own.
@@ -330,6 +331,14 @@ mod tests {
             words.starts_with("the parameter `k` rises with the state `T`") && words.contains(" for each K"),
             "{words}"
         );
+        // The other ways stand beside it, each once.
+        let way = |v: &Varying| matches!(&v.course, Course::Follows(f) if f.symbol == "T").then(|| v.course.clone());
+        let ways: Vec<Course> = std::iter::once(&found).chain(&found.ways).filter_map(way).collect();
+        assert_eq!(ways.len(), Way::ALL.len());
+        for of in Way::ALL {
+            assert!(ways.iter().any(|w| matches!(w, Course::Follows(f) if f.way == of)), "{of:?}");
+        }
+        assert!(found.ways.iter().all(|v| v.symbol == "k" && v.gain <= found.gain));
         let (found, _) = reaction("1");
         assert!(found.gain < 5.0, "{} {}", found.gain, found.words());
     }

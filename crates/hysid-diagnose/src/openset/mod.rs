@@ -60,8 +60,9 @@ pub struct OpenSet {
     pub writable: Option<Writable>,
     /// What it says in words, where it says more than that something is missing.
     pub words: Option<String>,
-    /// Terms beside a parameter that varies, or the other way round, where that gains less on the tangent and can be written.
-    pub rival: Option<Box<OpenSet>>,
+    /// Others that gain less on the tangent and can be written: terms beside a parameter that varies, or the other way round, and other ways in which it follows
+    /// its signal.
+    pub rivals: Vec<OpenSet>,
 }
 
 /// Odds against a mismatch before the recording is looked at. The noise model is an estimate: on recordings in which nothing is missing the best
@@ -123,18 +124,16 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let chosen = noises.iter().filter_map(|noise| choose(base, kind, &terms, noise, none));
     let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
     let of_sparse = |sparse: Chosen| of_terms(base, &terms, sparse);
-    let beside = |first: OpenSet, rival: OpenSet| OpenSet { rival: Some(Box::new(rival)), ..first };
-    match (sparse, varying(base, kind, &noises)) {
-        (Some(sparse), Some(varying)) if varying.gain > sparse.gain => {
-            Some(beside(of_varying(base, varying), of_sparse(sparse)))
-        }
-        // A walk cannot be written, and stands beside nothing.
-        (Some(sparse), Some(varying)) if !matches!(varying.course, Course::Walk(_)) => {
-            Some(beside(of_sparse(sparse), of_varying(base, varying)))
-        }
-        (Some(sparse), _) => Some(of_sparse(sparse)),
-        (None, varying) => varying.map(|found| of_varying(base, found)),
-    }
+    let varying = varying(base, kind, &noises);
+    // A walk cannot be written, and stands beside nothing.
+    let stands = |v: &Varying| sparse.as_ref().is_none_or(|s| v.gain > s.gain) || !matches!(v.course, Course::Walk(_));
+    let ways = |mut found: Varying| std::mem::take(&mut found.ways).into_iter().chain([found]);
+    let varying = varying.filter(stands).into_iter().flat_map(ways).map(|found| of_varying(base, found));
+    let mut all: Vec<OpenSet> = sparse.map(of_sparse).into_iter().chain(varying).collect();
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut all = all.into_iter();
+    let likeliest = all.next()?;
+    Some(OpenSet { rivals: all.collect(), ..likeliest })
 }
 
 /// The noise models under which a correction is looked for: the fit's own, and plain squares where that is coloured and may have taken mismatch for
@@ -191,7 +190,7 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
         choice: best.choice,
         writable: Some(Writable::Sparse(sparse)),
         words: None,
-        rival: None,
+        rivals: Vec::new(),
     }
 }
 
@@ -220,7 +219,7 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         choice: found.choice,
         writable: Some(with_course(&base.document(), &found)).filter(|w| !w.is_empty()).map(Writable::Varying),
         words: Some(found.words()),
-        rival: None,
+        rivals: Vec::new(),
     }
 }
 

@@ -37,11 +37,11 @@ struct Fit<'d> {
     hypothesis: Hypothesis<'d>,
 }
 
-/// Share of a correction's gain on the tangent from which its rival is fitted too: a parameter that varies is one law where it takes many terms to tell it,
+/// Share of a correction's gain on the tangent from which its rivals are fitted too: a parameter that varies is one law where it takes many terms to tell it,
 /// of which the tangent shows but a part, and is one fit; terms take many.
 const RIVAL: (f64, f64) = (0.5, 0.9);
 
-/// A correction as [`fitted`], or the rival of it, whichever has more evidence once it stands in the equations.
+/// A correction as [`fitted`], or a rival of it, whichever has more evidence once it stands in the equations.
 pub fn likelier<'d>(
     setting: &Setting<'d>,
     parent: &Hypothesis<'d>,
@@ -52,9 +52,9 @@ pub fn likelier<'d>(
         let share = if matches!(rival.writable, Some(Writable::Varying(_))) { RIVAL.0 } else { RIVAL.1 };
         rival.gain > share * open.gain
     };
-    let both = std::iter::once(open).chain(open.rival.as_deref().filter(likely));
+    let all = std::iter::once(open).chain(open.rivals.iter().filter(likely));
     let lead = |r: &Refitted<'d>| r.hypothesis.log_evidence - r.of.choice;
-    both.filter_map(|o| fitted(setting, parent, o, least)).max_by(|a, b| lead(a).total_cmp(&lead(b)))
+    all.filter_map(|o| fitted(setting, parent, o, least)).max_by(|a, b| lead(a).total_cmp(&lead(b)))
 }
 
 /// The correction fitted in the place of, or on top of, a set, without the terms that it does not need; further ones are looked for where it reaches this
@@ -132,12 +132,12 @@ fn with_more<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, best: &Fit<'d>)
         return None;
     }
     let mut open = correction(&best.hypothesis.base, setting.noise)?;
-    let rival = open.rival.take().map(|rival| *rival);
+    let rivals = std::mem::take(&mut open.rivals);
     let terms = |o: OpenSet| match o.writable {
         Some(Writable::Sparse(terms)) if o.gain > 0.0 => Some((terms, o.choice)),
         _ => None,
     };
-    let (more, choice) = [Some(open), rival].into_iter().flatten().find_map(terms)?;
+    let (more, choice) = std::iter::once(open).chain(rivals).find_map(terms)?;
     let longer = best.sparse.with(&fitted_values(best)?, &more);
     let longer = pruned(setting, parent, longer, &best.hypothesis.base.values())?;
     (longer.hypothesis.log_evidence > best.hypothesis.log_evidence + choice).then_some(longer)

@@ -65,6 +65,8 @@ pub struct Varying {
     pub choice: f64,
     /// What it would be more if the coefficients that it spares the noise model counted, as they do for a set of effects.
     spares: f64,
+    /// The same parameter following the same signal in other ways: which one is right shows once it stands in the equations.
+    pub ways: Vec<Varying>,
 }
 
 impl Varying {
@@ -123,23 +125,27 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<
     let signals = Signal::all(base);
     let pairs = pairs(base.model.simulation(), &machine, &symbols, &signals);
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
-    let mut best: Option<Varying> = None;
+    let mut all: Vec<Varying> = Vec::new();
     for noise in noises {
         let view = View::new(base, noise);
         let mut found = likely_walks(&view, kind, &of_walks);
         found.extend(likely_lines(base, &view, &machine, &time, symbols.len()));
         found.extend(likely_to_follow(&view, &pairs));
-        for candidate in found {
-            let Some(v) = judged(base, kind, noise, (&symbols, Way::ALL.len() * pairs.len()), &time, candidate, none)
-            else {
-                continue;
-            };
-            if best.as_ref().is_none_or(|b| v.gain > b.gain) {
-                best = Some(v);
-            }
+        let among = (symbols.as_slice(), Way::ALL.len() * pairs.len());
+        all.extend(found.into_iter().filter_map(|candidate| judged(base, kind, noise, among, &time, candidate, none)));
+    }
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut all = all.into_iter();
+    let mut best = all.next()?;
+    for other in all {
+        let (Course::Follows(one), Course::Follows(next)) = (&best.course, &other.course) else { continue };
+        let is_same = best.symbol == other.symbol && one.symbol == next.symbol;
+        let heard = |v: &Varying| matches!(&v.course, Course::Follows(f) if f.way == next.way);
+        if is_same && !heard(&best) && !best.ways.iter().any(heard) {
+            best.ways.push(other);
         }
     }
-    best
+    Some(best)
 }
 
 /// The parameters whose walk explains most under this noise.
@@ -305,6 +311,7 @@ fn judged(
         gain: likelihood - none - price - choice,
         choice,
         spares: credited(&base.whitener) - credited(&left),
+        ways: Vec::new(),
         left,
     })
 }

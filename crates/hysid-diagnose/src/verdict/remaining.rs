@@ -229,7 +229,7 @@ fn in_place<'d>(
     let beside = |o: &OpenSet| match o.writable.as_ref()? {
         Writable::Sparse(terms) => {
             let writable = Some(Writable::Sparse(terms.within(none.base.document())));
-            refitted(&OpenSet { writable, rival: None, ..o.clone() })
+            refitted(&OpenSet { writable, rivals: Vec::new(), ..o.clone() })
         }
         Writable::Varying(_) => None,
     };
