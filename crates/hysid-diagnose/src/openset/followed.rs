@@ -7,7 +7,7 @@ use super::sites::OTHERS;
 use super::terms::held_beyond;
 use crate::model::along;
 use crate::model::base::Base;
-use crate::slot::{Place, Structure, is_turn};
+use crate::slot::{Place, Structure, coefficient, is_place, is_turn};
 use crate::text::number;
 
 /// How a parameter follows a signal.
@@ -32,8 +32,8 @@ pub struct Signal {
     symbol: String,
     /// Whether it is a state, and no input.
     state: bool,
-    /// The parts that move, where it is a coordinate or the velocity of one.
-    moved: Option<Vec<String>>,
+    /// What moves, where it is a coordinate or the velocity of one.
+    moved: Option<Moving>,
     unit: Option<Unit>,
     /// As it is written: a state not further than it was seen to go.
     text: String,
@@ -43,6 +43,14 @@ pub struct Signal {
     spread: f64,
     /// The signal and its square, both without their means.
     pub courses: [Series; 2],
+}
+
+/// The parts of a machine that move, at the equations of their velocities, and the states and inputs that their coordinates and velocities are made of.
+#[derive(Debug, Clone)]
+struct Moving {
+    parts: Vec<String>,
+    coordinates: Vec<String>,
+    velocities: Vec<String>,
 }
 
 /// A signal, its square or both, counted from the mean in multiples of the standard deviation.
@@ -68,7 +76,7 @@ impl Signal {
     pub fn all(base: &Base<'_>) -> Vec<Self> {
         let simulation = base.model.simulation();
         let structure = Structure::of(simulation);
-        let motion = motion_in(&structure, &[Place::ForceLaw]);
+        let motion = motion_in(&structure, &[Place::ForceLaw], &["x", "v"]);
         let several = simulation.inputs.len() > 1;
         let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| several && !motion.contains(&u.symbol));
         let recorded = |i: usize| base.model.data().stretches.iter().map(|s| s.drive.inputs()[i].clone()).collect();
@@ -77,11 +85,9 @@ impl Signal {
         let states: Vec<&String> = states.collect();
         let meanings: Vec<Expr> = states.iter().map(|s| Expr::symbol(*s)).collect();
         let simulated = along(base, &meanings).unwrap_or_default();
-        let own = motion_in(&structure, &[Place::Force, Place::Connection]);
-        let parts = structure.slots.iter().filter(|s| s.place == Place::Force);
-        let parts: Vec<String> = parts.filter_map(|s| Some(s.label.strip_prefix("state:")?.to_owned())).collect();
+        let moving = Moving::of(&structure);
         let of_state = |(name, x): (&String, Series)| {
-            let moved = own.contains(name).then(|| parts.clone());
+            let moved = moving.has(name).then(|| moving.clone());
             Some(Self { moved, ..Self::new(simulation, name, x)? })
         };
         inputs.chain(states.into_iter().zip(simulated).filter_map(of_state)).collect()
@@ -143,19 +149,50 @@ impl Signal {
     }
 
     /// Whether a parameter or an input may follow it. One that stands among the forces on what moves, and nowhere else, and follows the motion is a curved law:
-    /// a damping that is stronger near the ends of a travel, where the speed is low, is what a dry friction looks like.
+    /// a damping that is stronger near the ends of a travel, where the speed is low, is what a dry friction looks like. Unless it is the gain of what comes
+    /// from elsewhere, as a force factor that falls along the stroke.
     pub fn leads(&self, simulation: &Simulation, symbol: &str) -> bool {
-        let Some(parts) = &self.moved else { return self.symbol != symbol };
-        let is_force = |s: &State| !s.derivative.uses(symbol) || parts.contains(&s.name);
-        simulation.outputs.iter().any(|o| o.expression.uses(symbol)) || !simulation.states.iter().all(is_force)
+        let Some(moving) = &self.moved else { return self.symbol != symbol };
+        let stands = moving.coordinates.contains(&self.symbol);
+        let is_law = |s: &State| {
+            let own = moving.parts.contains(&s.name);
+            !s.derivative.uses(symbol) || own && !(stands && moving.is_led_by(simulation, &s.derivative, symbol))
+        };
+        simulation.outputs.iter().any(|o| o.expression.uses(symbol)) || !simulation.states.iter().all(is_law)
     }
 }
 
-/// What the coordinates and velocities at slots of these places are made of.
-fn motion_in(structure: &Structure, places: &[Place]) -> Vec<String> {
+impl Moving {
+    fn of(structure: &Structure) -> Self {
+        let places = [Place::Force, Place::Connection];
+        let parts = structure.slots.iter().filter(|s| s.place == Place::Force);
+        Self {
+            parts: parts.filter_map(|s| Some(s.label.strip_prefix("state:")?.to_owned())).collect(),
+            coordinates: motion_in(structure, &places, &["x"]),
+            velocities: motion_in(structure, &places, &["v"]),
+        }
+    }
+
+    fn has(&self, name: &String) -> bool {
+        self.coordinates.contains(name) || self.velocities.contains(name)
+    }
+
+    /// Whether a symbol is, in the equation of a part, in proportion the gain of something that is no motion, or that itself.
+    fn is_led_by(&self, simulation: &Simulation, derivative: &Expr, symbol: &str) -> bool {
+        let is_free = |name: &String| {
+            let input = simulation.inputs.iter().any(|u| u.symbol == *name) && !is_place(simulation, name);
+            (input || simulation.state(name).is_some()) && !self.has(name) && !self.parts.contains(name)
+        };
+        coefficient(derivative, symbol)
+            .is_some_and(|gain| gain.symbols().iter().chain([&symbol.to_owned()]).any(is_free))
+    }
+}
+
+/// What these quantities at slots of these places are made of.
+fn motion_in(structure: &Structure, places: &[Place], quantities: &[&str]) -> Vec<String> {
     let slots = structure.slots.iter().filter(|s| places.contains(&s.place));
-    let quantities = slots.flat_map(|s| ["x", "v"].map(|n| s.quantity(n))).flatten();
-    quantities.flat_map(|q| q.expression.symbols()).collect()
+    let found = slots.flat_map(|s| quantities.iter().filter_map(|n| s.quantity(n)));
+    found.flat_map(|q| q.expression.symbols()).collect()
 }
 
 /// The square from zero, but for its mean, of what is so many deviations from its mean, with the square of that less one.
@@ -226,7 +263,7 @@ mod tests {
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(simulation, &data, NoiseKind::Coloured, &budget);
         let base = none.base;
-        let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
+        let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).swap_remove(0);
         let written = with_course(&base.document(), &found).swap_remove(0);
         let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
         (found, rms(&fit.fit.residual) < 1.05 * 0.1)
@@ -278,7 +315,7 @@ mod tests {
         let (setting, none) = calibrated(simulation, &data, NoiseKind::Coloured, &budget);
         let base = none.base;
         assert_eq!(modulated(&base), ["g", "T"]);
-        let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).unwrap();
+        let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).swap_remove(0);
         let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
         assert_eq!((found.symbol.as_str(), input.symbol.as_str()), ("T", "q"), "{}", found.words());
         let written = with_course(&base.document(), &found).swap_remove(0);
@@ -293,7 +330,7 @@ mod tests {
                            T = { derivative = \"h*k*c - U*(T - T_j)\", initial = 0.0, unit = \"K\" }\n[outputs]\nshare = \"c\"\nreactor_K = \"T\"\n";
 
     /// What is found around a reactor whose rate depends so on its temperature, and what is left where it is written, over what was left before.
-    fn reaction(factor: &str) -> (Varying, f64) {
+    fn reaction(factor: &str) -> (Vec<Varying>, f64) {
         let original = Simulation::parse(REACTOR, "reactor.sim.toml").unwrap();
         let mut truth = original.clone();
         let by = Expr::parse(&format!("k*({factor})")).unwrap();
@@ -313,8 +350,8 @@ mod tests {
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let base = none.base;
-        let found = varying(&base, NoiseKind::White(1.0), std::slice::from_ref(&base.whitener)).unwrap();
-        let forms = with_course(&base.document(), &found);
+        let found = varying(&base, NoiseKind::White(1.0), std::slice::from_ref(&base.whitener));
+        let forms = with_course(&base.document(), &found[0]);
         let fits = forms.iter().filter_map(|form| setting.fit(form, &Values::default(), None, 2, 25));
         let left = fits.map(|f| rms(&f.fit.residual)).fold(f64::INFINITY, f64::min) / rms(&base.fit.residual);
         (found, left)
@@ -322,7 +359,8 @@ mod tests {
 
     #[test]
     fn a_rate_that_depends_on_a_state_is_found_in_all_equations_at_once() {
-        let (found, left) = reaction("exp(0.03*T)");
+        let (all, left) = reaction("exp(0.03*T)");
+        let found = &all[0];
         let Course::Follows(state) = &found.course else { panic!("{}", found.words()) };
         assert_eq!((found.symbol.as_str(), state.symbol.as_str(), state.state), ("k", "T", true), "{}", found.words());
         assert!(found.gain > 100.0 && left < 0.3, "{} {left}", found.gain);
@@ -331,15 +369,12 @@ mod tests {
             words.starts_with("the parameter `k` rises with the state `T`") && words.contains(" for each K"),
             "{words}"
         );
-        // The other ways stand beside it, each once.
+        // The other ways stand behind it, each once.
         let way = |v: &Varying| matches!(&v.course, Course::Follows(f) if f.symbol == "T").then(|| v.course.clone());
-        let ways: Vec<Course> = std::iter::once(&found).chain(&found.ways).filter_map(way).collect();
-        assert_eq!(ways.len(), Way::ALL.len());
-        for of in Way::ALL {
-            assert!(ways.iter().any(|w| matches!(w, Course::Follows(f) if f.way == of)), "{of:?}");
-        }
-        assert!(found.ways.iter().all(|v| v.symbol == "k" && v.gain <= found.gain));
-        let (found, _) = reaction("1");
+        let ways: Vec<Course> = all.iter().filter(|v| v.symbol == "k").filter_map(way).collect();
+        let has = |w: &Way| ways.iter().any(|c| matches!(c, Course::Follows(f) if f.way == *w));
+        assert!(ways.len() == all.len() && all.len() == Way::ALL.len() && Way::ALL.iter().all(has));
+        let found = reaction("1").0.swap_remove(0);
         assert!(found.gain < 5.0, "{} {}", found.gain, found.words());
     }
 

@@ -60,8 +60,8 @@ pub struct OpenSet {
     pub writable: Option<Writable>,
     /// What it says in words, where it says more than that something is missing.
     pub words: Option<String>,
-    /// Others that gain less on the tangent and can be written: terms beside a parameter that varies, or the other way round, and other ways in which it follows
-    /// its signal.
+    /// Others that gain less on the tangent and can be written: terms beside a parameter that varies, or the other way round, what stands behind a walk, and
+    /// other ways in which a parameter follows its signal.
     pub rivals: Vec<OpenSet>,
 }
 
@@ -124,11 +124,10 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let chosen = noises.iter().filter_map(|noise| choose(base, kind, &terms, noise, none));
     let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
     let of_sparse = |sparse: Chosen| of_terms(base, &terms, sparse);
-    let varying = varying(base, kind, &noises);
     // A walk cannot be written, and stands beside nothing.
     let stands = |v: &Varying| sparse.as_ref().is_none_or(|s| v.gain > s.gain) || !matches!(v.course, Course::Walk(_));
-    let ways = |mut found: Varying| std::mem::take(&mut found.ways).into_iter().chain([found]);
-    let varying = varying.filter(stands).into_iter().flat_map(ways).map(|found| of_varying(base, found));
+    let varying: Vec<Varying> = varying(base, kind, &noises).into_iter().filter(stands).collect();
+    let varying = varying.into_iter().map(|found| of_varying(base, found));
     let mut all: Vec<OpenSet> = sparse.map(of_sparse).into_iter().chain(varying).collect();
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut all = all.into_iter();

@@ -65,8 +65,6 @@ pub struct Varying {
     pub choice: f64,
     /// What it would be more if the coefficients that it spares the noise model counted, as they do for a set of effects.
     spares: f64,
-    /// The same parameter following the same signal in other ways: which one is right shows once it stands in the equations.
-    pub ways: Vec<Varying>,
 }
 
 impl Varying {
@@ -107,8 +105,30 @@ struct Candidate {
     gain: f64,
 }
 
-/// The parameter that varies most likely, judged with a noise model of its own; `None` where nothing can be modulated.
-pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<Varying> {
+/// The parameter that varies most likely, judged with a noise model of its own; none where nothing can be modulated. Behind a walk, which cannot be written,
+/// the likeliest that does not walk; behind one that follows a signal the other ways in which it may: which one is right shows once it stands in the
+/// equations.
+pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Vec<Varying> {
+    let mut all = all(base, kind, noises).unwrap_or_default();
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut kept: Vec<Varying> = Vec::new();
+    for other in all {
+        let stands_behind = |one: &Varying| match (&one.course, &other.course) {
+            (Course::Walk(_), course) => !matches!(course, Course::Walk(_)),
+            (Course::Follows(f), Course::Follows(g)) => {
+                one.symbol == other.symbol && f.symbol == g.symbol && f.way != g.way
+            }
+            _ => false,
+        };
+        if kept.iter().all(stands_behind) {
+            kept.push(other);
+        }
+    }
+    kept
+}
+
+/// The parameters that may vary one way or another; `None` where nothing can be modulated.
+fn all(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<Vec<Varying>> {
     let all = modulated(base);
     let time = Time::of(base)?;
     let data = base.model.data().with_still_inputs(all.len());
@@ -134,18 +154,7 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<
         let among = (symbols.as_slice(), Way::ALL.len() * pairs.len());
         all.extend(found.into_iter().filter_map(|candidate| judged(base, kind, noise, among, &time, candidate, none)));
     }
-    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let mut all = all.into_iter();
-    let mut best = all.next()?;
-    for other in all {
-        let (Course::Follows(one), Course::Follows(next)) = (&best.course, &other.course) else { continue };
-        let is_same = best.symbol == other.symbol && one.symbol == next.symbol;
-        let heard = |v: &Varying| matches!(&v.course, Course::Follows(f) if f.way == next.way);
-        if is_same && !heard(&best) && !best.ways.iter().any(heard) {
-            best.ways.push(other);
-        }
-    }
-    Some(best)
+    Some(all)
 }
 
 /// The parameters whose walk explains most under this noise.
@@ -311,7 +320,6 @@ fn judged(
         gain: likelihood - none - price - choice,
         choice,
         spares: credited(&base.whitener) - credited(&left),
-        ways: Vec::new(),
         left,
     })
 }

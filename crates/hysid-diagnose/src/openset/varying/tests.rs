@@ -47,7 +47,7 @@ fn fitted(data: &DataSet) -> Base<'_> {
 fn found(data: &DataSet) -> Varying {
     let base = fitted(data);
     let plain = data.layout.fit_noise(&base.fit.residual, 0, &[]);
-    varying(&base, NoiseKind::Coloured, &[base.whitener.clone(), plain]).unwrap()
+    varying(&base, NoiseKind::Coloured, &[base.whitener.clone(), plain]).swap_remove(0)
 }
 
 #[test]
