@@ -243,7 +243,7 @@ mod tests {
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::openset::course::Course;
-    use crate::openset::factor::with_course;
+    use crate::openset::factor::Varied;
     use crate::openset::modulation::modulated;
     use crate::openset::varying::{Varying, varying};
     use crate::oscillator::{normal, rms};
@@ -264,7 +264,7 @@ mod tests {
         let (setting, none) = calibrated(simulation, &data, NoiseKind::Coloured, &budget);
         let base = none.base;
         let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).swap_remove(0);
-        let written = with_course(&base.document(), &found).swap_remove(0);
+        let written = Varied::new(&base.document(), &found).unwrap().forms.swap_remove(0).simulation;
         let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
         (found, rms(&fit.fit.residual) < 1.05 * 0.1)
     }
@@ -272,12 +272,12 @@ mod tests {
     #[test]
     fn a_coefficient_that_follows_another_input_is_found_with_its_slope() {
         let (found, answers) = follows(|i| 1.0 + 0.05 * (i - 2.0));
-        let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
-        assert_eq!((found.symbol.as_str(), input.symbol.as_str()), ("f", "i"), "{}", found.words());
+        let Course::Follows(input) = &found.what.course else { panic!("{}", found.what.words()) };
+        assert_eq!((found.what.symbol.as_str(), input.symbol.as_str()), ("f", "i"), "{}", found.what.words());
         assert!(found.gain > 20.0 && answers, "{}", found.gain);
-        let slope: f64 = found.amplitudes[0] / 0.5_f64.sqrt();
+        let slope: f64 = found.what.amplitudes[0] / 0.5_f64.sqrt();
         assert!((slope - 0.05).abs() < 0.01, "{slope}");
-        let words = found.words();
+        let words = found.what.words();
         assert!(words.starts_with("the parameter `f` rises with the input `i` along a curve, by "), "{words}");
     }
 
@@ -285,9 +285,9 @@ mod tests {
     fn a_coefficient_may_follow_along_a_curve() {
         // As a viscosity that falls to half its value over the range.
         let (found, answers) = follows(|i| (-0.35 * (i - 2.0)).exp());
-        let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
-        assert_eq!((found.symbol.as_str(), input.symbol.as_str(), input.way), ("f", "i", Way::Curved));
-        assert!(answers && found.words().contains("along a curve"), "{}", found.words());
+        let Course::Follows(input) = &found.what.course else { panic!("{}", found.what.words()) };
+        assert_eq!((found.what.symbol.as_str(), input.symbol.as_str(), input.way), ("f", "i", Way::Curved));
+        assert!(answers && found.what.words().contains("along a curve"), "{}", found.what.words());
     }
 
     /// As the time of transport through a pipe does the flow.
@@ -316,9 +316,9 @@ mod tests {
         let base = none.base;
         assert_eq!(modulated(&base), ["g", "T"]);
         let found = varying(&base, NoiseKind::Coloured, std::slice::from_ref(&base.whitener)).swap_remove(0);
-        let Course::Follows(input) = &found.course else { panic!("{}", found.words()) };
-        assert_eq!((found.symbol.as_str(), input.symbol.as_str()), ("T", "q"), "{}", found.words());
-        let written = with_course(&base.document(), &found).swap_remove(0);
+        let Course::Follows(input) = &found.what.course else { panic!("{}", found.what.words()) };
+        assert_eq!((found.what.symbol.as_str(), input.symbol.as_str()), ("T", "q"), "{}", found.what.words());
+        let written = Varied::new(&base.document(), &found).unwrap().forms.swap_remove(0).simulation;
         let fit = setting.fit(&written, &Values::default(), None, 2, 25).unwrap();
         let left = [&fit.fit, &base.fit].map(|f| rms(&f.residual));
         assert!(found.gain > 20.0 && left[0] < 0.5 * left[1], "{} {left:?}", found.gain);
@@ -330,7 +330,7 @@ mod tests {
                            T = { derivative = \"h*k*c - U*(T - T_j)\", initial = 0.0, unit = \"K\" }\n[outputs]\nshare = \"c\"\nreactor_K = \"T\"\n";
 
     /// What is found around a reactor whose rate depends so on its temperature, and what is left where it is written, over what was left before.
-    fn reaction(factor: &str) -> (Vec<Varying>, f64) {
+    fn reaction(factor: &str) -> (Vec<Varying>, f64, String) {
         let original = Simulation::parse(REACTOR, "reactor.sim.toml").unwrap();
         let mut truth = original.clone();
         let by = Expr::parse(&format!("k*({factor})")).unwrap();
@@ -351,31 +351,42 @@ mod tests {
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         let base = none.base;
         let found = varying(&base, NoiseKind::White(1.0), std::slice::from_ref(&base.whitener));
-        let forms = with_course(&base.document(), &found[0]);
-        let fits = forms.iter().filter_map(|form| setting.fit(form, &Values::default(), None, 2, 25));
-        let left = fits.map(|f| rms(&f.fit.residual)).fold(f64::INFINITY, f64::min) / rms(&base.fit.residual);
-        (found, left)
+        let varied = Varied::new(&base.document(), &found[0]).unwrap();
+        let fits = varied.forms.iter().filter_map(|form| {
+            let fit = setting.fit(&form.simulation, &Values::default(), None, 2, 25)?;
+            let (what, _) = varied.fitted(form, &fit.values())?;
+            Some((rms(&fit.fit.residual) / rms(&base.fit.residual), what.words()))
+        });
+        let (left, words) = fits.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        (found, left, words)
     }
 
     #[test]
     fn a_rate_that_depends_on_a_state_is_found_in_all_equations_at_once() {
-        let (all, left) = reaction("exp(0.03*T)");
+        let (all, left, words) = reaction("exp(0.03*T)");
         let found = &all[0];
-        let Course::Follows(state) = &found.course else { panic!("{}", found.words()) };
-        assert_eq!((found.symbol.as_str(), state.symbol.as_str(), state.state), ("k", "T", true), "{}", found.words());
-        assert!(found.gain > 100.0 && left < 0.3, "{} {left}", found.gain);
-        let words = found.words();
-        assert!(
-            words.starts_with("the parameter `k` rises with the state `T`") && words.contains(" for each K"),
-            "{words}"
+        let Course::Follows(state) = &found.what.course else { panic!("{}", found.what.words()) };
+        assert_eq!(
+            (found.what.symbol.as_str(), state.symbol.as_str(), state.state),
+            ("k", "T", true),
+            "{}",
+            found.what.words()
         );
+        assert!(found.gain > 100.0 && left < 0.3, "{} {left}", found.gain);
+        let told = words.strip_prefix("the parameter `k` rises with the state `T`").expect(&words);
+        let slope =
+            told.split_once(" by ").and_then(|(_, t)| t.split_once(" % of its value for each K")).expect(&words);
+        // As it was fitted: the tangent, far from there, has less.
+        assert!((slope.0.parse::<f64>().unwrap() - 3.0).abs() < 0.1, "{words}; {}", found.what.words());
         // The other ways stand behind it, each once.
-        let way = |v: &Varying| matches!(&v.course, Course::Follows(f) if f.symbol == "T").then(|| v.course.clone());
-        let ways: Vec<Course> = all.iter().filter(|v| v.symbol == "k").filter_map(way).collect();
+        let way = |v: &Varying| {
+            matches!(&v.what.course, Course::Follows(f) if f.symbol == "T").then(|| v.what.course.clone())
+        };
+        let ways: Vec<Course> = all.iter().filter(|v| v.what.symbol == "k").filter_map(way).collect();
         let has = |w: &Way| ways.iter().any(|c| matches!(c, Course::Follows(f) if f.way == *w));
         assert!(ways.len() == all.len() && all.len() == Way::ALL.len() && Way::ALL.iter().all(has));
         let found = reaction("1").0.swap_remove(0);
-        assert!(found.gain < 5.0, "{} {}", found.gain, found.words());
+        assert!(found.gain < 5.0, "{} {}", found.gain, found.what.words());
     }
 
     #[test]

@@ -26,7 +26,6 @@ mod view;
 mod written;
 
 use hysid_linalg::Matrix;
-use hysid_plant::Simulation;
 use hysid_select::{Criterion, Options as Selecting, select};
 
 use crate::data::held_out_blocks;
@@ -35,12 +34,12 @@ use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use course::Course;
-use factor::with_course;
+use factor::Varied;
 use regress::regress;
 use shapes::Kind;
 use signature::signature;
 use terms::{Term, terms};
-use varying::{Varying, varying};
+use varying::{Variation, Varying, varying};
 use view::View;
 use written::Sparse;
 
@@ -86,6 +85,12 @@ impl OpenSet {
     pub fn gains_by_chance(&self, odds_against: f64) -> f64 {
         gains_by_chance(self.gain, odds_against)
     }
+
+    /// As a parameter that varies was fitted.
+    fn fitted(&self, (what, err): (Variation, &[f64])) -> Self {
+        let record = CorrectionRecord { terms: what.terms(err), ..self.record.clone() };
+        Self { record, words: Some(what.words()), ..self.clone() }
+    }
 }
 
 /// A correction that can be written into a simulation.
@@ -93,8 +98,8 @@ impl OpenSet {
 pub enum Writable {
     /// Generic terms.
     Sparse(Sparse),
-    /// The simulation with a parameter that oscillates or follows a signal, in one form or another.
-    Varying(Vec<Simulation>),
+    /// A parameter that oscillates or follows a signal.
+    Varying(Varied),
 }
 
 /// Most terms of a correction.
@@ -125,7 +130,8 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
     let of_sparse = |sparse: Chosen| of_terms(base, &terms, sparse);
     // A walk cannot be written, and stands beside nothing.
-    let stands = |v: &Varying| sparse.as_ref().is_none_or(|s| v.gain > s.gain) || !matches!(v.course, Course::Walk(_));
+    let stands =
+        |v: &Varying| sparse.as_ref().is_none_or(|s| v.gain > s.gain) || !matches!(v.what.course, Course::Walk(_));
     let varying: Vec<Varying> = varying(base, kind, &noises).into_iter().filter(stands).collect();
     let varying = varying.into_iter().map(|found| of_varying(base, found));
     let mut all: Vec<OpenSet> = sparse.map(of_sparse).into_iter().chain(varying).collect();
@@ -196,28 +202,19 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
 /// A correction by a parameter that varies.
 fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
     let columns: Vec<&[f64]> = found.columns.iter().map(Vec::as_slice).collect();
-    let mut order: Vec<usize> = (0..found.texts.len()).collect();
-    order.sort_by(|&a, &b| found.err[b].total_cmp(&found.err[a]));
-    let records = order
-        .iter()
-        .take(MOST_TERMS)
-        .map(|&i| TermRecord {
-            term: format!("{}*{}", found.symbol, found.texts[i]),
-            coefficient: found.amplitudes[i],
-            err: found.err[i],
-        })
-        .collect();
-    let place = if found.input { "input" } else { "parameter" };
-    let side = if matches!(found.course, Course::Follows(_)) { "plant" } else { "time" };
+    let what = &found.what;
+    let place = if what.input { "input" } else { "parameter" };
+    let side = if matches!(what.course, Course::Follows(_)) { "plant" } else { "time" };
     let signature =
         SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "odd".into(), side: side.into() };
+    let (slot, terms) = (format!("{place}:{}", what.symbol), what.terms(&found.err));
     OpenSet {
-        record: CorrectionRecord { slot: format!("{place}:{}", found.symbol), terms: records, signature, ratio: None },
+        record: CorrectionRecord { slot, terms, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),
         gain: found.gain,
         choice: found.choice,
-        writable: Some(with_course(&base.document(), &found)).filter(|w| !w.is_empty()).map(Writable::Varying),
-        words: Some(found.words()),
+        writable: Varied::new(&base.document(), &found).map(Writable::Varying),
+        words: Some(what.words()),
         rivals: Vec::new(),
     }
 }

@@ -23,7 +23,7 @@ pub struct Refitted<'d> {
     pub terms: Vec<TermRecord>,
     /// The slot of the loudest of them.
     pub slot: Option<String>,
-    /// What the tangent said of it.
+    /// What the tangent said of it; a parameter that varies as it was fitted.
     pub of: OpenSet,
 }
 
@@ -61,10 +61,14 @@ pub fn likelier<'d>(
 /// log evidence without them.
 fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, open: &OpenSet, least: f64) -> Option<Refitted<'d>> {
     let sparse = match open.writable.as_ref()? {
-        Writable::Varying(forms) => {
-            let fits = forms.iter().filter_map(|form| fit(setting, parent, &parent.base.values(), form));
-            let hypothesis = fits.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-            return Some(Refitted { hypothesis, terms: Vec::new(), slot: None, of: open.clone() });
+        Writable::Varying(varied) => {
+            let fits = varied.forms.iter().filter_map(|form| {
+                let hypothesis = fit(setting, parent, &parent.base.values(), &form.simulation)?;
+                Some((form, hypothesis))
+            });
+            let (form, hypothesis) = fits.max_by(|(_, a), (_, b)| a.log_evidence.total_cmp(&b.log_evidence))?;
+            let of = open.fitted(varied.fitted(form, &hypothesis.base.values())?);
+            return Some(Refitted { hypothesis, terms: Vec::new(), slot: None, of });
         }
         Writable::Sparse(sparse) => sparse.clone(),
     };

@@ -1,6 +1,6 @@
 //! Corrections of simulations in which something of no mechanism is missing.
 
-use hysid_plant::{Compiled, Drive, Expr, Run};
+use hysid_plant::{Compiled, Drive, Expr, Run, Simulation};
 
 use super::*;
 use crate::budget::Budget;

@@ -6,18 +6,18 @@
 //! noise. A walk pays for what the recording settles of it ([`Wander`]); an oscillation pays for two amplitudes, and for the lines and parameters among
 //! which it was found; what follows a signal for one, along a curve for two, and for the signals and parameters.
 
-use std::f64::consts::SQRT_2;
-
 use hysid_plant::Simulation;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use super::MOST_TERMS;
 use super::course::{COURSES, Course, Series, Time};
 use super::followed::{Signal, Way};
 use super::modulation::{Modulated, modulated};
 use super::regress::regress;
 use super::view::View;
 use crate::evidence::{Wander, Whitener, dot, lines, norm2};
+use crate::file::TermRecord;
 use crate::mechanism::SLOW;
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
@@ -35,9 +35,10 @@ const FOLLOWING: usize = 2;
 /// Rounds of amplitudes and noise by turns.
 const ROUNDS: usize = 3;
 
-/// A parameter that varies.
-pub struct Varying {
-    /// Its symbol, or that of an input whose gain varies.
+/// What varies, and how.
+#[derive(Debug, Clone)]
+pub struct Variation {
+    /// The parameter's symbol, or that of an input whose gain varies.
     pub symbol: String,
     /// Whether it is an input.
     pub input: bool,
@@ -45,16 +46,22 @@ pub struct Varying {
     pub course: Course,
     /// The courses over time, as factors of the parameter's own value, for an amplitude of one.
     pub texts: Vec<String>,
-    /// Their responses.
-    pub columns: Vec<Vec<f64>>,
     /// Their amplitudes.
     pub amplitudes: Vec<f64>,
+    /// Standard deviation of the modulation over the recording.
+    pub size: f64,
+}
+
+/// A parameter that varies, on the tangent of a fitted simulation.
+pub struct Varying {
+    /// What varies, and how.
+    pub what: Variation,
+    /// The responses to its courses.
+    pub columns: Vec<Vec<f64>>,
     /// What the amplitudes' scale weighs in a regression of whitened rows.
     pub precision: f64,
     /// Share of the residual's power that each explains.
     pub err: Vec<f64>,
-    /// Standard deviation of the modulation over the recording.
-    pub size: f64,
     /// Length of the recording, in seconds.
     pub length_s: f64,
     /// The noise of what is left.
@@ -72,28 +79,39 @@ impl Varying {
     /// no noise at all, and what it spares the noise model counts as for an effect; a walk and a line may be a part of the noise that the set leaves.
     pub fn gain_as_a_rival(&self) -> f64 {
         self.gain
-            + match self.course {
+            + match self.what.course {
                 Course::Walk(_) => SLOW,
                 Course::Line(_) => 0.0,
                 Course::Follows(_) => self.spares,
             }
     }
+}
 
+impl Variation {
     /// In words.
     pub fn words(&self) -> String {
         let what = if self.input { "the gain of the input" } else { "the parameter" };
         let how = match &self.course {
-            Course::Follows(input) => input.words(self.amplitudes.first().copied().unwrap_or(0.0)),
+            Course::Follows(signal) => signal.words(self.amplitudes.first().copied().unwrap_or(0.0)),
             Course::Walk(_) => {
                 format!("wanders slowly in time, by {} % of its value (rms)", number(100.0 * self.size))
             }
-            Course::Line(f) => format!(
-                "oscillates in time at {} Hz, by {} % of its value",
-                number(*f),
-                number(100.0 * SQRT_2 * self.size)
-            ),
+            Course::Line(f) => {
+                let share = 100.0 * norm2(&self.amplitudes).sqrt();
+                format!("oscillates in time at {} Hz, by {} % of its value", number(*f), number(share))
+            }
         };
         format!("{what} `{}` {how}", self.symbol)
+    }
+
+    /// Its courses as terms, the one that explains most first, with these shares of the residual's power.
+    pub fn terms(&self, err: &[f64]) -> Vec<TermRecord> {
+        let term =
+            |((text, &coefficient), &err)| TermRecord { term: format!("{}*{text}", self.symbol), coefficient, err };
+        let mut terms: Vec<TermRecord> = self.texts.iter().zip(&self.amplitudes).zip(err).map(term).collect();
+        terms.sort_by(|a, b| b.err.total_cmp(&a.err));
+        terms.truncate(MOST_TERMS);
+        terms
     }
 }
 
@@ -113,10 +131,10 @@ pub fn varying(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Vec<Var
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut kept: Vec<Varying> = Vec::new();
     for other in all {
-        let stands_behind = |one: &Varying| match (&one.course, &other.course) {
+        let stands_behind = |one: &Varying| match (&one.what.course, &other.what.course) {
             (Course::Walk(_), course) => !matches!(course, Course::Walk(_)),
             (Course::Follows(f), Course::Follows(g)) => {
-                one.symbol == other.symbol && f.symbol == g.symbol && f.way != g.way
+                one.what.symbol == other.what.symbol && f.symbol == g.symbol && f.way != g.way
             }
             _ => false,
         };
@@ -306,15 +324,11 @@ fn judged(
     let err = white.iter().zip(&amplitudes).map(|(c, a)| a * dot(c, &view.r) / total).collect();
     let symbol = symbols.get(symbol)?.clone();
     let input = base.model.simulation().inputs.iter().any(|u| u.symbol == symbol);
+    let (texts, size) = (time.texts(&course), time.deviation(&course, &amplitudes));
     Some(Varying {
-        symbol,
-        input,
-        texts: time.texts(&course),
-        size: time.deviation(&course, &amplitudes),
         precision: course.precision(share),
-        course,
+        what: Variation { symbol, input, course, texts, amplitudes, size },
         columns,
-        amplitudes,
         err,
         length_s: time.length,
         gain: likelihood - none - price - choice,

@@ -82,7 +82,7 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
         let lead = best.log_evidence - pool[rest].log_evidence - places - found.gain_as_a_rival();
         let probability = 1.0 / (1.0 + (EVIDENCE_WEIGHT * lead).exp());
         let by_chance = gains_by_chance(found.gain, ODDS_AGAINST_MORE);
-        let found = Wanders { probability, by_chance, words: found.words() };
+        let found = Wanders { probability, by_chance, words: found.what.words() };
         Some(as_well.filter(|w| w.probability > found.probability).unwrap_or(found))
     };
     (0..best.effects.len()).map(of).collect()

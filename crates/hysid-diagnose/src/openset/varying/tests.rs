@@ -1,7 +1,7 @@
 //! Parameters that vary against machines in which they do.
 
 use std::cell::Cell;
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 
 use hysid_plant::Simulation;
 use hysid_signal::{Channel, Clock, Recording};
@@ -10,7 +10,7 @@ use super::*;
 use crate::data::DataSet;
 use crate::model::base::{Start, fit_simulation};
 use crate::model::{Model, Values};
-use crate::openset::factor::with_course;
+use crate::openset::factor::Varied;
 pub use crate::oscillator::BASELINE;
 use crate::oscillator::{PERIOD, REAL, drive, normal, respond, rms};
 use crate::refit::LmOptions;
@@ -53,22 +53,27 @@ fn found(data: &DataSet) -> Varying {
 #[test]
 fn a_stiffness_that_oscillates_is_found_with_its_frequency_and_size() {
     let v = found(&recorded(3, |t| 1.0 + 0.02 * (TAU * 0.73 * t + 0.4).sin(), 0.02));
-    let Course::Line(f) = v.course else { panic!("{}", v.words()) };
-    assert!(v.symbol == "k" && (f - 0.73).abs() < 0.01 && v.gain > 30.0, "{} {}", v.words(), v.gain);
-    assert!((SQRT_2 * v.size - 0.02).abs() < 0.005, "{}", v.words());
+    let Course::Line(f) = v.what.course else { panic!("{}", v.what.words()) };
+    assert!(v.what.symbol == "k" && (f - 0.73).abs() < 0.01 && v.gain > 30.0, "{} {}", v.what.words(), v.gain);
+    assert!((SQRT_2 * v.what.size - 0.02).abs() < 0.005, "{}", v.what.words());
 }
 
 #[test]
 fn a_stiffness_that_wanders_is_found() {
     let v = found(&recorded(4, |t| 1.0 + 0.02 * ((0.31 * t).sin() + (0.17 * t).cos() * (0.53 * t).sin()), 0.02));
-    assert!(v.symbol == "k" && matches!(v.course, Course::Walk(_)) && v.gain > 30.0, "{} {}", v.words(), v.gain);
+    assert!(
+        v.what.symbol == "k" && matches!(v.what.course, Course::Walk(_)) && v.gain > 30.0,
+        "{} {}",
+        v.what.words(),
+        v.gain
+    );
 }
 
 #[test]
 fn a_constant_stiffness_is_left_alone() {
     for seed in 10..16 {
         let v = found(&recorded(seed, |_| 1.0, 0.02));
-        assert!(v.gain < 3.0, "{seed}: {} {}", v.words(), v.gain);
+        assert!(v.gain < 3.0, "{seed}: {} {}", v.what.words(), v.gain);
     }
 }
 
@@ -99,7 +104,7 @@ fn the_response_of_a_course_is_the_derivative_of_what_is_written() {
     let data = recorded(3, |t| 1.0 + 0.02 * (TAU * 0.73 * t).sin(), 0.02);
     let v = found(&data);
     let base = fitted(&data);
-    let written = with_course(&base.document(), &v).swap_remove(0);
+    let written = Varied::new(&base.document(), &v).unwrap().forms.swap_remove(0).simulation;
     let names: Vec<String> = written.parameters.iter().map(|p| p.name.clone()).filter(|n| n.starts_with('g')).collect();
     assert_eq!(names.len(), 2);
     for (name, column) in names.iter().zip(&v.columns) {
