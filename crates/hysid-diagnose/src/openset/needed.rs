@@ -41,6 +41,10 @@ struct Fit<'d> {
 /// of which the tangent shows but a part, and is one fit; terms take many.
 const RIVAL: (f64, f64) = (0.5, 0.9);
 
+/// What an exponential must lead a sum by, in log evidence: a product of a parameter and what it follows is the simpler law, and beyond what was recorded the two
+/// part.
+const BENT: f64 = 3.0;
+
 /// A correction as [`fitted`], or a rival of it, whichever has more evidence once it stands in the equations.
 pub fn likelier<'d>(
     setting: &Setting<'d>,
@@ -66,7 +70,11 @@ fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, open: &OpenSet, le
                 let hypothesis = fit(setting, parent, &parent.base.values(), &form.simulation)?;
                 Some((form, hypothesis))
             });
-            let (form, hypothesis) = fits.max_by(|(_, a), (_, b)| a.log_evidence.total_cmp(&b.log_evidence))?;
+            // In the order of the forms: a later one has to show.
+            let (form, hypothesis) = fits.reduce(|best, other| {
+                let leads = other.1.log_evidence > best.1.log_evidence + BENT;
+                if leads { other } else { best }
+            })?;
             let of = open.fitted(varied.fitted(form, &hypothesis.base.values())?);
             return Some(Refitted { hypothesis, terms: Vec::new(), slot: None, of });
         }
