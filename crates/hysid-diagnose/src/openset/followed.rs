@@ -7,7 +7,7 @@ use super::sites::OTHERS;
 use super::terms::held_beyond;
 use crate::model::along;
 use crate::model::base::Base;
-use crate::slot::{Place, Structure, coefficient, is_place, is_turn};
+use crate::slot::{Place, Structure, is_turn};
 use crate::text::number;
 
 /// How a parameter follows a signal.
@@ -32,8 +32,8 @@ pub struct Signal {
     symbol: String,
     /// Whether it is a state, and no input.
     state: bool,
-    /// What moves, where it is a coordinate or the velocity of one.
-    moved: Option<Moving>,
+    /// The parts that move, where it is a coordinate or the velocity of one.
+    moved: Option<Vec<String>>,
     unit: Option<Unit>,
     /// As it is written: a state not further than it was seen to go.
     text: String,
@@ -43,14 +43,6 @@ pub struct Signal {
     spread: f64,
     /// The signal and its square, both without their means.
     pub courses: [Series; 2],
-}
-
-/// The parts of a machine that move, at the equations of their velocities, and the states and inputs that their coordinates and velocities are made of.
-#[derive(Debug, Clone)]
-struct Moving {
-    parts: Vec<String>,
-    coordinates: Vec<String>,
-    velocities: Vec<String>,
 }
 
 /// A signal, its square or both, counted from the mean in multiples of the standard deviation.
@@ -76,7 +68,7 @@ impl Signal {
     pub fn all(base: &Base<'_>) -> Vec<Self> {
         let simulation = base.model.simulation();
         let structure = Structure::of(simulation);
-        let motion = motion_in(&structure, &[Place::ForceLaw], &["x", "v"]);
+        let motion = motion_in(&structure, &[Place::ForceLaw]);
         let several = simulation.inputs.len() > 1;
         let inputs = simulation.inputs.iter().enumerate().filter(|(_, u)| several && !motion.contains(&u.symbol));
         let recorded = |i: usize| base.model.data().stretches.iter().map(|s| s.drive.inputs()[i].clone()).collect();
@@ -85,9 +77,11 @@ impl Signal {
         let states: Vec<&String> = states.collect();
         let meanings: Vec<Expr> = states.iter().map(|s| Expr::symbol(*s)).collect();
         let simulated = along(base, &meanings).unwrap_or_default();
-        let moving = Moving::of(&structure);
+        let own = motion_in(&structure, &[Place::Force, Place::Connection]);
+        let parts = structure.slots.iter().filter(|s| s.place == Place::Force);
+        let parts: Vec<String> = parts.filter_map(|s| Some(s.label.strip_prefix("state:")?.to_owned())).collect();
         let of_state = |(name, x): (&String, Series)| {
-            let moved = moving.has(name).then(|| moving.clone());
+            let moved = own.contains(name).then(|| parts.clone());
             Some(Self { moved, ..Self::new(simulation, name, x)? })
         };
         inputs.chain(states.into_iter().zip(simulated).filter_map(of_state)).collect()
@@ -149,50 +143,19 @@ impl Signal {
     }
 
     /// Whether a parameter or an input may follow it. One that stands among the forces on what moves, and nowhere else, and follows the motion is a curved law:
-    /// a damping that is stronger near the ends of a travel, where the speed is low, is what a dry friction looks like. Unless it is the gain of what comes
-    /// from elsewhere, as a force factor that falls along the stroke.
+    /// a damping that is stronger near the ends of a travel, where the speed is low, is what a dry friction looks like.
     pub fn leads(&self, simulation: &Simulation, symbol: &str) -> bool {
-        let Some(moving) = &self.moved else { return self.symbol != symbol };
-        let stands = moving.coordinates.contains(&self.symbol);
-        let is_law = |s: &State| {
-            let own = moving.parts.contains(&s.name);
-            !s.derivative.uses(symbol) || own && !(stands && moving.is_led_by(simulation, &s.derivative, symbol))
-        };
-        simulation.outputs.iter().any(|o| o.expression.uses(symbol)) || !simulation.states.iter().all(is_law)
+        let Some(parts) = &self.moved else { return self.symbol != symbol };
+        let is_force = |s: &State| !s.derivative.uses(symbol) || parts.contains(&s.name);
+        simulation.outputs.iter().any(|o| o.expression.uses(symbol)) || !simulation.states.iter().all(is_force)
     }
 }
 
-impl Moving {
-    fn of(structure: &Structure) -> Self {
-        let places = [Place::Force, Place::Connection];
-        let parts = structure.slots.iter().filter(|s| s.place == Place::Force);
-        Self {
-            parts: parts.filter_map(|s| Some(s.label.strip_prefix("state:")?.to_owned())).collect(),
-            coordinates: motion_in(structure, &places, &["x"]),
-            velocities: motion_in(structure, &places, &["v"]),
-        }
-    }
-
-    fn has(&self, name: &String) -> bool {
-        self.coordinates.contains(name) || self.velocities.contains(name)
-    }
-
-    /// Whether a symbol is, in the equation of a part, in proportion the gain of something that is no motion, or that itself.
-    fn is_led_by(&self, simulation: &Simulation, derivative: &Expr, symbol: &str) -> bool {
-        let is_free = |name: &String| {
-            let input = simulation.inputs.iter().any(|u| u.symbol == *name) && !is_place(simulation, name);
-            (input || simulation.state(name).is_some()) && !self.has(name) && !self.parts.contains(name)
-        };
-        coefficient(derivative, symbol)
-            .is_some_and(|gain| gain.symbols().iter().chain([&symbol.to_owned()]).any(is_free))
-    }
-}
-
-/// What these quantities at slots of these places are made of.
-fn motion_in(structure: &Structure, places: &[Place], quantities: &[&str]) -> Vec<String> {
+/// What the coordinates and velocities at slots of these places are made of.
+fn motion_in(structure: &Structure, places: &[Place]) -> Vec<String> {
     let slots = structure.slots.iter().filter(|s| places.contains(&s.place));
-    let found = slots.flat_map(|s| quantities.iter().filter_map(|n| s.quantity(n)));
-    found.flat_map(|q| q.expression.symbols()).collect()
+    let quantities = slots.flat_map(|s| ["x", "v"].map(|n| s.quantity(n))).flatten();
+    quantities.flat_map(|q| q.expression.symbols()).collect()
 }
 
 /// The square from zero, but for its mean, of what is so many deviations from its mean, with the square of that less one.

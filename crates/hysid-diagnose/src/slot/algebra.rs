@@ -3,7 +3,7 @@
 use hysid_plant::{BinaryOp, Expr, Simulation};
 
 /// The coefficient of `symbol` in an expression that is linear in it; `None` where it does not occur or not linearly.
-pub(crate) fn coefficient(expr: &Expr, symbol: &str) -> Option<Expr> {
+pub(super) fn coefficient(expr: &Expr, symbol: &str) -> Option<Expr> {
     if !expr.uses(symbol) {
         return None;
     }

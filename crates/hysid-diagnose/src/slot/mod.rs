@@ -44,7 +44,7 @@ pub use find::Structure;
 pub(crate) use find::feeds;
 pub use place::Place;
 
-pub(crate) use algebra::{coefficient, is_linear, only_parameters};
+pub(crate) use algebra::{is_linear, only_parameters};
 pub(crate) use balance::with_balances;
 pub(crate) use loops::play_of;
 pub(crate) use motion::{ForcePath, force_path, is_place};
