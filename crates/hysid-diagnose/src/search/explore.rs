@@ -205,6 +205,8 @@ pub fn explore<'a, 'd>(
     if !significant {
         pool.clear();
     }
+    // What could be missing in it takes a quarter of the memory of a search.
+    let least = under_white.map(|(start, _)| start);
     // Plain squares take what a random force does for mismatch, also where the simulation is linear.
     let mut forced = None;
     let mut set_aside = None;
@@ -247,7 +249,6 @@ pub fn explore<'a, 'd>(
             forced = None;
         }
     }
-    let least = under_white.map(|(start, _)| start);
     let (search, none) = match gross {
         Some((start, found)) if significant => {
             candidates = found;
