@@ -127,13 +127,25 @@ pub fn explore<'a, 'd>(
     hooks: &'a Hooks<'a>,
     lessons: usize,
 ) -> Explored<'a, 'd> {
-    let again = |lesson: Lesson<'d>| {
-        (hooks.progress)(lesson.doing);
-        let next = Setting { substeps: lesson.substeps, ..setting.clone() };
-        let mut found = explore(&next, lesson.base, request, hooks, lessons - 1);
-        found.notes.insert(0, lesson.note);
-        found
+    let lesson = match attempt(setting, base, request, hooks, lessons) {
+        Ok(found) => return found,
+        Err(lesson) => lesson,
     };
+    (hooks.progress)(lesson.doing);
+    let next = Setting { substeps: lesson.substeps, ..setting.clone() };
+    let mut found = explore(&next, lesson.base, request, hooks, lessons - 1);
+    found.notes.insert(0, lesson.note);
+    found
+}
+
+/// The same, up to what it teaches: what a search holds is forgotten before the next one begins.
+fn attempt<'a, 'd>(
+    setting: &Setting<'d>,
+    base: Base<'d>,
+    request: &Request<'_>,
+    hooks: &'a Hooks<'a>,
+    lessons: usize,
+) -> Result<Explored<'a, 'd>, Box<Lesson<'d>>> {
     let learned = |search: &Search<'_, 'd>, none: &Hypothesis<'d>, pool: &[Hypothesis<'d>], done: Done| {
         (lessons > 0).then(|| lesson(setting, &search.setting, none, pool, done)).flatten()
     };
@@ -213,7 +225,7 @@ pub fn explore<'a, 'd>(
     if significant && let Some((start, found)) = gross.take() {
         plainly.singles(&start, &found, &mut pool, &glanced);
         if let Some(lesson) = learned(&plainly, &start, &pool, Done::Singles) {
-            return again(lesson);
+            return Err(Box::new(lesson));
         }
         plainly.combine(&start, &found, &mut pool, !glanced.is_empty(), 0);
         glanced.clear();
@@ -230,7 +242,7 @@ pub fn explore<'a, 'd>(
     if significant && gross.is_none() {
         search.singles(&none, &candidates, &mut pool, &glanced);
         if let Some(lesson) = learned(&search, &none, &pool, Done::Singles) {
-            return again(lesson);
+            return Err(Box::new(lesson));
         }
         // Where what plain squares have composed leads under the noise model too, only what could stand in its members' place is heard.
         let settled = if set_aside.is_some() { settled(&pool) } else { 0 };
@@ -262,7 +274,9 @@ pub fn explore<'a, 'd>(
             let next = Setting { substeps: lesson.substeps, ..search.setting.clone() };
             let finely = Search::new(next, options, hooks);
             // The next search begins under the first noise model; here everything is judged under the one that decided.
-            let Some(base) = recalibrated(&finely.setting, &lesson.base, None) else { return again(lesson) };
+            let Some(base) = recalibrated(&finely.setting, &lesson.base, None) else {
+                return Err(Box::new(lesson));
+            };
             let coarsely = gains(&none, &pool);
             let none = finely.setting.hypothesis(Vec::new(), base);
             let sets = finely.under_noise(&none, &pool);
@@ -270,13 +284,13 @@ pub fn explore<'a, 'd>(
             let settled = clear(&pool).is_some_and(|families| clear(&sets).is_some_and(|now| now == families))
                 || unmoved(&coarsely, &gains(&none, &sets));
             if !settled && !lesson.only_fits {
-                return again(lesson);
+                return Err(Box::new(lesson));
             }
             notes.push(lesson.fitted_note());
             pool = sets;
             (finely, none)
         }
-        Some(lesson) => return again(lesson),
+        Some(lesson) => return Err(Box::new(lesson)),
         None => (search, none),
     };
     if significant && forced.is_none() && parts(&none) {
@@ -300,7 +314,7 @@ pub fn explore<'a, 'd>(
         }
     }
     pool.insert(0, none);
-    Explored { search, pool, candidates, significant, shown, p_value, residual, detectable, least, notes }
+    Ok(Explored { search, pool, candidates, significant, shown, p_value, residual, detectable, least, notes })
 }
 
 #[cfg(test)]

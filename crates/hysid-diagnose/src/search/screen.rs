@@ -21,7 +21,7 @@ use crate::slot::{Slot, Structure, only_parameters};
 pub const JOINT: usize = 2;
 /// Points of a candidate whose columns take part in the mismatch test: at least, and at most as the rows allow (the columns are held in memory).
 /// A resonance between two of a few points shows in none of them.
-const KEPT: (usize, usize) = (6, 24);
+const KEPT: (usize, usize) = (4, 24);
 /// Rows in all points of a candidate together.
 const KEPT_ROWS: usize = 200_000;
 
@@ -224,7 +224,6 @@ pub fn screen_along(
             let screening = mechanism.rewrite(&document, slot, signals, Purpose::Screening).ok()?;
             let mut points = features(along, &screening, slot, &values, own, r, total)?;
             points.sort_by(|a, b| b.score.total_cmp(&a.score));
-            points.iter_mut().skip(JOINT).for_each(|p| p.joint = None);
             let best = points.first()?;
             let purpose = mechanism.fitted_first(slot, &best.amplitudes, &best.shapes);
             let refit = mechanism.rewrite(&document, slot, signals, purpose).ok()?;
@@ -286,9 +285,18 @@ fn features(
                 amplitudes,
                 score,
             });
+            forget_the_weakest(&mut points);
         }
     }
     (!points.is_empty()).then_some(points)
+}
+
+/// Of more points than pairs are judged by, the columns of the one that explains least: all of them together are hundreds of megabytes of a long recording.
+fn forget_the_weakest(points: &mut [Point]) {
+    let mut held: Vec<&mut Point> = points.iter_mut().filter(|p| p.joint.is_some()).collect();
+    // Of equal ones the last.
+    held.sort_by(|a, b| b.score.total_cmp(&a.score));
+    held.into_iter().skip(JOINT).for_each(|p| p.joint = None);
 }
 
 /// The values with a start for each state that an effect added: where the state of the slot that it goes with starts (`x_a` with `x`).
