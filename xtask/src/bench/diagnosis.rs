@@ -6,6 +6,9 @@ use super::case::{Case, Contender, Goal, Input, Measure, Program, Side};
 
 const TOOL: &str = "hysid diagnose, 2 threads";
 
+/// Memory that a diagnosis may have.
+const MOST_MIB: f64 = 500.0;
+
 /// The cases.
 pub fn cases() -> Vec<Case> {
     let case = |name, work, group, most| Case {
@@ -23,7 +26,7 @@ pub fn cases() -> Vec<Case> {
             rounds: usize::MAX,
             over: TOOL,
         }],
-        goals: vec![Goal::Wall { tool: TOOL, most }],
+        goals: vec![Goal::Wall { tool: TOOL, most }, Goal::Memory { tool: TOOL, most_mib: MOST_MIB }],
         remark: "Each round is another case: the first with 4000 samples of the development bank (`cargo xtask prove --development`), \
                  plants of one to three outputs. Reading the files and writing the report are within.",
     };

@@ -7,7 +7,7 @@ use serde_json::Value;
 use xshell::{Shell, cmd};
 
 use super::guard::has_flag;
-use super::measure::before_all_others;
+use super::process::before_all_others;
 
 /// The rates, each with its unit, under the key by which `timed limits` prints them.
 const RATES: [(&str, &str); 3] = [

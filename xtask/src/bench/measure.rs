@@ -1,6 +1,7 @@
 //! Runs the contenders of a case, in turns, and keeps what each said.
 
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::Context;
@@ -11,6 +12,7 @@ use serde_json::Value;
 use xshell::{Shell, cmd};
 
 use super::case::{Case, Contender, Input, Measure, Program, Side};
+use super::process::{children_seconds, load, peak_mib};
 
 /// Median, smallest and largest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -218,18 +220,22 @@ impl Place<'_> {
             .context("too few cases")?;
         let (folder, program) = (self.folder().join("case"), self.root.join("target/release/hysid"));
         case.write(&folder)?;
-        let (threads, before, began) = (threads.to_string(), children_seconds(), Instant::now());
-        cmd!(
-            self.shell,
-            "{program} diagnose {folder}/baseline.sim.toml --recording {folder}/est.csv --holdout {folder}/val.csv --threads {threads} --out {folder}/out"
-        )
-        .quiet()
-        .ignore_stdout()
-        .ignore_stderr()
-        .run()?;
+        let at = |name: &str| folder.join(name);
+        let mut command = Command::new(program);
+        command.arg("diagnose").arg(at("baseline.sim.toml")).arg("--recording").arg(at("est.csv"));
+        command
+            .arg("--holdout")
+            .arg(at("val.csv"))
+            .arg("--out")
+            .arg(at("out"))
+            .args(["--threads", &threads.to_string()]);
+        let (before, began) = (children_seconds(), Instant::now());
+        let peak = peak_mib(command.stdout(Stdio::null()).stderr(Stdio::null()))?;
         let wall = began.elapsed().as_secs_f64();
         let cpu = children_seconds().zip(before).map_or(wall, |(now, then)| now - then);
-        Ok(serde_json::json!({ "cpu_s": [cpu], "wall_s": [wall], "samples": case.label.samples }).to_string())
+        let samples = case.label.samples;
+        let said = serde_json::json!({ "cpu_s": [cpu], "wall_s": [wall], "samples": samples, "peak_rss_mib": peak });
+        Ok(said.to_string())
     }
 
     /// Differences of the outputs from that of the contender over which each is put, where there are outputs.
@@ -260,31 +266,6 @@ fn difference(ours: &[f64], other: &[f64]) -> Option<f64> {
 /// Little-endian doubles.
 fn doubles(bytes: &[u8]) -> Vec<f64> {
     bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
-}
-
-fn load() -> Option<f64> {
-    std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
-}
-
-/// What stands before a command that runs before all others on the machine (Linux), as this process and those that it starts do now.
-pub fn before_all_others() -> &'static str {
-    // The priority among such processes; 0 for an ordinary one.
-    match own_state(37) {
-        None | Some(0.0) => "",
-        Some(_) => "chrt -f 1 ",
-    }
-}
-
-/// A number of what Linux tells of this process (`/proc/self/stat`), counted from the state, 0, behind the name, which may hold anything but
-/// ends at the last parenthesis.
-fn own_state(place: usize) -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    text.rsplit_once(')')?.1.split_whitespace().nth(place)?.parse().ok()
-}
-
-/// CPU seconds of the processes that this one started and that have ended (Linux, to 0.01 s).
-fn children_seconds() -> Option<f64> {
-    Some((own_state(13)? + own_state(14)?) / 100.0)
 }
 
 /// A Python with the other tools' packages, installed where they are not.

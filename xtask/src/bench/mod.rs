@@ -10,6 +10,7 @@ mod guard;
 mod limits;
 mod measure;
 mod page;
+mod process;
 mod selection;
 mod simulation;
 mod slopes;
@@ -104,7 +105,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let outcomes = place.run(case, rounds).with_context(|| case.name.to_string())?;
         let peers = if args.peers { " --peers" } else { "" };
         let command =
-            format!("{}cargo xtask bench{peers} --cases {} --rounds {rounds}", measure::before_all_others(), case.name);
+            format!("{}cargo xtask bench{peers} --cases {} --rounds {rounds}", process::before_all_others(), case.name);
         renew(case.name, &page::block(case, &outcomes, &command))?;
     }
     Ok(())

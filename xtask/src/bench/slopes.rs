@@ -7,8 +7,9 @@ use hysid_report::figure::{LogAxes, Mark, Plot, Tone};
 use serde_json::Value;
 use xshell::{Shell, cmd};
 
-use super::measure::{Spread, before_all_others};
+use super::measure::Spread;
 use super::page::spread;
+use super::process::before_all_others;
 
 /// The cost over one axis: for each place the CPU seconds of every round.
 struct Axis {

@@ -13,8 +13,8 @@ use hysid_dictionary::{Factor, Model, Quantity, Term};
 use serde_json::Value;
 use xshell::{Shell, cmd};
 
-use super::measure::before_all_others;
 use super::page::renew;
+use super::process::before_all_others;
 
 /// Size of the file.
 const BYTES: u64 = 2_000_000_000;
