@@ -2,6 +2,7 @@
 
 mod bad_files;
 mod calibrate;
+mod closed_loop;
 mod common;
 mod document;
 mod many_runs;
