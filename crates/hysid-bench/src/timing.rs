@@ -32,10 +32,10 @@ pub fn repeat(reps: usize, mut work: impl FnMut()) -> (Vec<f64>, Vec<f64>) {
 /// One JSON object: the seconds of each repetition, the `samples` that one went through, peak memory and load.
 pub fn report(cpu: &[f64], wall: &[f64], samples: usize) -> String {
     let mut out = format!("{{\"cpu_s\": {}, \"wall_s\": {}, \"samples\": {samples}", list(cpu), list(wall));
-    if let Some(peak) = status("/proc/self/status", "VmHWM:") {
-        let _ = write!(out, ", \"peak_rss_mib\": {}", peak / 1024.0);
+    if let Some(peak) = peak_mib("self") {
+        let _ = write!(out, ", \"peak_rss_mib\": {peak}");
     }
-    if let Some(load) = status("/proc/loadavg", "") {
+    if let Some(load) = load() {
         let _ = write!(out, ", \"loadavg\": {load}");
     }
     out + "}"
@@ -45,6 +45,16 @@ pub fn report(cpu: &[f64], wall: &[f64], samples: usize) -> String {
 pub fn list(values: &[f64]) -> String {
     let words: Vec<String> = values.iter().map(|v| format!("{v:e}")).collect();
     format!("[{}]", words.join(", "))
+}
+
+/// The most memory that a running process has had, by its number or `self`, in MiB (Linux).
+pub fn peak_mib(process: &str) -> Option<f64> {
+    Some(status(&format!("/proc/{process}/status"), "VmHWM:")? / 1024.0)
+}
+
+/// The machine's load average (Linux).
+pub fn load() -> Option<f64> {
+    status("/proc/loadavg", "")
 }
 
 /// The number behind `key` in a file of the system.

@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::Context;
+use hysid_bench::timing::load;
 use hysid_concealed::bank;
 use hysid_concealed::case::Group;
 use hysid_concealed::seed::Stream;
@@ -12,7 +13,7 @@ use serde_json::Value;
 use xshell::{Shell, cmd};
 
 use super::case::{Case, Contender, Input, Measure, Program, Side};
-use super::process::{children_seconds, load, peak_mib};
+use super::process::{children_seconds, run_with_peak};
 
 /// Median, smallest and largest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -220,17 +221,13 @@ impl Place<'_> {
             .context("too few cases")?;
         let (folder, program) = (self.folder().join("case"), self.root.join("target/release/hysid"));
         case.write(&folder)?;
-        let at = |name: &str| folder.join(name);
         let mut command = Command::new(program);
-        command.arg("diagnose").arg(at("baseline.sim.toml")).arg("--recording").arg(at("est.csv"));
-        command
-            .arg("--holdout")
-            .arg(at("val.csv"))
-            .arg("--out")
-            .arg(at("out"))
-            .args(["--threads", &threads.to_string()]);
+        command.arg("diagnose").arg(folder.join("baseline.sim.toml")).args(["--threads", &threads.to_string()]);
+        for (option, name) in [("--recording", "est.csv"), ("--holdout", "val.csv"), ("--out", "out")] {
+            command.arg(option).arg(folder.join(name));
+        }
         let (before, began) = (children_seconds(), Instant::now());
-        let peak = peak_mib(command.stdout(Stdio::null()).stderr(Stdio::null()))?;
+        let peak = run_with_peak(command.stdout(Stdio::null()).stderr(Stdio::null()))?;
         let wall = began.elapsed().as_secs_f64();
         let cpu = children_seconds().zip(before).map_or(wall, |(now, then)| now - then);
         let samples = case.label.samples;

@@ -3,29 +3,24 @@
 use std::process::Command;
 use std::time::Duration;
 
+use hysid_bench::timing::peak_mib;
+
 /// How often the memory of a program that runs is looked at.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Runs a program and tells the most memory that it had, as it was last seen, in MiB.
-pub fn peak_mib(command: &mut Command) -> anyhow::Result<Option<f64>> {
+pub fn run_with_peak(command: &mut Command) -> anyhow::Result<Option<f64>> {
     let mut child = command.spawn()?;
-    let state = format!("/proc/{}/status", child.id());
+    let process = child.id().to_string();
     let mut peak = None;
     loop {
-        let text = std::fs::read_to_string(&state).unwrap_or_default();
-        let kib = text.lines().find_map(|l| l.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<f64>().ok());
-        peak = kib.map(|kib| kib / 1024.0).or(peak);
+        peak = peak_mib(&process).or(peak);
         if let Some(status) = child.try_wait()? {
             anyhow::ensure!(status.success(), "{} failed: {status}", command.get_program().display());
             return Ok(peak);
         }
         std::thread::sleep(LOOK);
     }
-}
-
-/// The machine's load average.
-pub fn load() -> Option<f64> {
-    std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
 }
 
 /// What stands before a command that runs before all others on the machine (Linux), as this process and those that it starts do now.

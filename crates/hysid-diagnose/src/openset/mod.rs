@@ -88,8 +88,10 @@ impl OpenSet {
 
     /// As a parameter that varies was fitted.
     fn fitted(&self, (what, err): (Variation, &[f64])) -> Self {
-        let record = CorrectionRecord { terms: what.terms(err), ..self.record.clone() };
-        Self { record, words: Some(what.words()), ..self.clone() }
+        let mut fitted = self.clone();
+        fitted.record.terms = what.terms(err);
+        fitted.words = Some(what.words());
+        fitted
     }
 }
 
@@ -128,13 +130,12 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let none = kind.share() * View::new(base, &base.whitener).log_likelihood(base);
     let chosen = noises.iter().filter_map(|noise| choose(base, kind, &terms, noise, none));
     let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
-    let of_sparse = |sparse: Chosen| of_terms(base, &terms, sparse);
     // A walk cannot be written, and stands beside nothing.
-    let stands =
-        |v: &Varying| sparse.as_ref().is_none_or(|s| v.gain > s.gain) || !matches!(v.what.course, Course::Walk(_));
-    let varying: Vec<Varying> = varying(base, kind, &noises).into_iter().filter(stands).collect();
-    let varying = varying.into_iter().map(|found| of_varying(base, found));
-    let mut all: Vec<OpenSet> = sparse.map(of_sparse).into_iter().chain(varying).collect();
+    let most = sparse.as_ref().map_or(f64::NEG_INFINITY, |s| s.gain);
+    let stands = |v: &Varying| v.gain > most || !matches!(v.what.course, Course::Walk(_));
+    let varying = varying(base, kind, &noises).into_iter().filter(stands).map(|found| of_varying(base, found));
+    let mut all: Vec<OpenSet> =
+        sparse.map(|sparse| of_terms(base, &terms, sparse)).into_iter().chain(varying).collect();
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut all = all.into_iter();
     let likeliest = all.next()?;

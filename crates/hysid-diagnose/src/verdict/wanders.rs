@@ -61,7 +61,7 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
     let best = &pool[winner];
     let kind = search.setting.noise;
     // What varies around a set, which members of one course share.
-    let mut heard: BTreeMap<usize, Vec<Varying>> = BTreeMap::new();
+    let mut heard: BTreeMap<usize, Option<Varying>> = BTreeMap::new();
     let of = |member: usize| {
         if best.effects[member].mechanism.family != Family::TimeVariation {
             return None;
@@ -75,8 +75,8 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
         let as_well = several.then(|| Wanders::as_well(own_course(&best.effects[member])));
         let Some(rest) = best_that_says(pool, &best.key_of(|i| !course(i))) else { return as_well };
         let base = &pool[rest].base;
-        let found = heard.entry(rest).or_insert_with(|| varying(base, kind, &noises(base, kind)));
-        let Some(found) = found.first() else { return as_well };
+        let found = heard.entry(rest).or_insert_with(|| varying(base, kind, &noises(base, kind)).into_iter().next());
+        let Some(found) = found else { return as_well };
         // What varies has paid for the parameters among which it was found; a moment was looked for too.
         let places = search.places_of(&best.effects[member]).ln();
         let lead = best.log_evidence - pool[rest].log_evidence - places - found.gain_as_a_rival();
