@@ -1,6 +1,7 @@
 //! The steps of a diagnosis, in order: intake, calibration, test, screening, refit, composition, verdict, hold-out.
 
 use hysid_plant::Simulation;
+use rayon::prelude::*;
 
 use crate::answer::draw::{Sitting, picture};
 use crate::answer::picture::Picture;
@@ -25,6 +26,7 @@ use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 use crate::openset::shapes::told_rate;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
+use crate::search::gentle::take_gentlest;
 use crate::search::profile::{centre_moments, take_intervals};
 use crate::search::rounding::Converter;
 use crate::search::shaken::shake;
@@ -90,9 +92,11 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     let mut found = explore(&setting, base, request, hooks, LESSONS);
     shake(&found.search.setting, &mut found.pool, request.options.seed);
     let most = found.pool.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    for h in found.pool.iter_mut().filter(|h| h.log_evidence > most - COULD_STAND) {
+    let could_stand = |h: &&mut Hypothesis<'_>| h.log_evidence > most - COULD_STAND;
+    found.pool.par_iter_mut().filter(could_stand).for_each(|h| {
+        take_gentlest(&found.search.setting, h);
         centre_moments(&found.search.setting, h);
-    }
+    });
     notes.extend(found.notes.iter().cloned());
     notes.extend(answers(&found.pool, request.questions));
 

@@ -81,6 +81,45 @@ both_forms! {
 }
 
 both_forms! {
+    /// y += a x.
+    pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+        for (y, x) in y.iter_mut().zip(x) {
+            *y += a * x;
+        }
+    }
+}
+
+both_forms! {
+    /// Turns complex numbers, `re + i im`, each by its own angle, and returns the sums of what they were.
+    pub fn turn(re: &mut [f64], im: &mut [f64], cos: &[f64], sin: &[f64]) -> (f64, f64) {
+        let n = re.len().min(im.len()).min(cos.len()).min(sin.len());
+        let ((re, im), (cos, sin)) = ((&mut re[..n], &mut im[..n]), (&cos[..n], &sin[..n]));
+        let (mut sums, whole) = ([[0.0; 8]; 2], n - n % 8);
+        for (((re, im), cos), sin) in re[..whole]
+            .chunks_exact_mut(8)
+            .zip(im[..whole].chunks_exact_mut(8))
+            .zip(cos[..whole].chunks_exact(8))
+            .zip(sin[..whole].chunks_exact(8))
+        {
+            for k in 0..8 {
+                let (x, y) = (re[k], im[k]);
+                sums[0][k] += x;
+                sums[1][k] += y;
+                re[k] = x * cos[k] - y * sin[k];
+                im[k] = x * sin[k] + y * cos[k];
+            }
+        }
+        let [mut x, mut y] = sums.map(|s| s.iter().sum::<f64>());
+        for k in whole..n {
+            x += re[k];
+            y += im[k];
+            (re[k], im[k]) = (re[k] * cos[k] - im[k] * sin[k], re[k] * sin[k] + im[k] * cos[k]);
+        }
+        (x, y)
+    }
+}
+
+both_forms! {
     /// y *= x, entry by entry.
     pub fn multiply_by(x: &[f64], y: &mut [f64]) {
         for (y, x) in y.iter_mut().zip(x) {
@@ -133,6 +172,21 @@ mod tests {
             assert_eq!(dot(&a, &b), expected, "{n}");
             let squares: f64 = a.iter().map(|x| x * x / 4.0).sum();
             approx::assert_relative_eq!(leave_one_out_sum(&a, &b, 1e-9), squares, max_relative = 1e-14);
+        }
+    }
+
+    #[test]
+    fn turning_adds_up_the_powers_of_a_root_of_unity() {
+        for n in [1_usize, 7, 8, 19] {
+            let angles: Vec<f64> = (0..n).map(|i| 0.3 * i as f64).collect();
+            let (sin, cos): (Vec<f64>, Vec<f64>) = angles.iter().map(|a| a.sin_cos()).unzip();
+            let (mut re, mut im) = (vec![1.0; n], vec![0.0; n]);
+            for k in 0..5 {
+                let (x, y) = turn(&mut re, &mut im, &cos, &sin);
+                let power = |f: fn(f64) -> f64| angles.iter().map(|a| f(f64::from(k) * a)).sum::<f64>();
+                approx::assert_abs_diff_eq!(x, power(f64::cos), epsilon = 1e-12);
+                approx::assert_abs_diff_eq!(y, power(f64::sin), epsilon = 1e-12);
+            }
         }
     }
 

@@ -13,10 +13,9 @@
 //! References: J. Nyblom, Testing for the constancy of parameters over time, JASA 84 (1989) 223; B. E. Hansen, Testing for parameter instability in
 //! linear models, Journal of Policy Modeling 14 (1992) 517.
 
+use hysid_linalg::dot;
 use hysid_signal::fourier;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-
-use super::projector::dot;
 
 /// Scales of the normal amplitudes that are tried: the first one and the ratio of the next to it.
 const SCALES: (f64, f64, usize) = (2e-4, 2.0, 16);

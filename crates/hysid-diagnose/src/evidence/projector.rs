@@ -1,20 +1,6 @@
 //! The projector onto the complement of what the simulation's own parameters and initial states can do.
 
-/// Inner product, summed in fixed order in eight lanes.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let n = a.len().min(b.len());
-    let (a, b) = (&a[..n], &b[..n]);
-    let mut acc = [0.0f64; 8];
-    let mut ca = a.chunks_exact(8);
-    let mut cb = b.chunks_exact(8);
-    for (x, y) in (&mut ca).zip(&mut cb) {
-        for i in 0..8 {
-            acc[i] += x[i] * y[i];
-        }
-    }
-    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
-    ((acc[0] + acc[4]) + (acc[1] + acc[5])) + ((acc[2] + acc[6]) + (acc[3] + acc[7])) + tail
-}
+use hysid_linalg::{axpy, dot};
 
 /// Squared Euclidean norm.
 pub fn norm2(a: &[f64]) -> f64 {
@@ -24,8 +10,7 @@ pub fn norm2(a: &[f64]) -> f64 {
 /// Takes the part along orthonormal columns out of `x`.
 pub fn remove_along(columns: &[Vec<f64>], x: &mut [f64]) {
     for q in columns {
-        let c = dot(q, x);
-        x.iter_mut().zip(q).for_each(|(x, q)| *x -= c * q);
+        axpy(-dot(q, x), q, x);
     }
 }
 

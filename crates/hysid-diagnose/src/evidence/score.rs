@@ -1,9 +1,10 @@
 //! The score of an effect: how much of the residual its response explains that the simulation's own parameters cannot.
 
+use hysid_linalg::dot;
 use statrs::function::gamma::{gamma_ur, ln_gamma};
 
 use super::layout::{Layout, Whitener};
-use super::projector::{Projector, dot, norm2};
+use super::projector::{Projector, norm2};
 
 /// Below this the tail of the chi-square law is taken from its asymptotic series.
 const LEAST_TAIL: f64 = 1e-200;

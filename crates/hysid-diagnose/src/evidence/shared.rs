@@ -8,10 +8,10 @@
 //!
 //! Reference: H. Luetkepohl, New Introduction to Multiple Time Series Analysis, Springer (2005), section 2.3 (orthogonal innovations).
 
+use hysid_linalg::dot;
 use nalgebra::DMatrix;
 
 use super::layout::{Layout, Series};
-use super::projector::dot;
 
 /// The correlation of whitened rows of one moment.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,8 +8,9 @@
 //!
 //! Reference: B. Widrow, I. Kollár, Quantization Noise, Cambridge University Press (2008), ch. 4.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
+use hysid_linalg::turn;
 use hysid_signal::range;
 
 /// Steps that the signal must cover at least: a smooth distribution has a characteristic function of its own below that.
@@ -30,6 +31,8 @@ const VISIBLE: f64 = 0.3;
 const ABOVE: f64 = 5.0;
 /// Largest peaks at which a simulated signal is rounded.
 const PEAKS: usize = 12;
+/// Share of a peak's size that the place next to it has at least.
+const NEAR_THE_PEAK: f64 = 0.9;
 
 /// The step of these values, of which a simulation without steps says what they would be; `None` where they show none.
 pub fn resolution(values: &[f64], simulated: &[f64]) -> Option<f64> {
@@ -82,8 +85,12 @@ fn sawtooth(values: &[f64], simulated: &[f64], known: Option<f64>) -> Option<f64
     let (at, errors): (Vec<f64>, Vec<f64>) = pairs.map(|(v, x)| (*x, v - x)).unzip();
     let search = Search::new(&at, &errors)?;
     let sizes = search.sizes();
-    let mut peaks: Vec<usize> =
-        (1..sizes.len().saturating_sub(1)).filter(|&i| sizes[i] >= sizes[i - 1] && sizes[i] > sizes[i + 1]).collect();
+    let chance = chance(sizes.len());
+    // A sawtooth explains pi^2/6 of what its first harmonic does, whose gain is the square of the size; between two places a peak loses little of it.
+    let least = NEAR_THE_PEAK * (chance / (PI * PI / 6.0)).sqrt();
+    let mut peaks: Vec<usize> = (1..sizes.len().saturating_sub(1))
+        .filter(|&i| sizes[i] > least && sizes[i] >= sizes[i - 1] && sizes[i] > sizes[i + 1])
+        .collect();
     peaks.sort_by(|a, b| sizes[*b].total_cmp(&sizes[*a]));
     let power = |q: Option<f64>| -> f64 {
         let rounding = |x: f64| q.map_or(0.0, |q| q * (x / q).round() - x);
@@ -95,7 +102,7 @@ fn sawtooth(values: &[f64], simulated: &[f64], known: Option<f64>) -> Option<f64
     let steps = peaks.into_iter().take(PEAKS).map(|i| 1.0 / search.refined(i)).map(|q| (q, gain(q)));
     let steps = steps.chain(known.map(|q| (q, gain(q))));
     let (q, gain) = steps.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (gain > chance(sizes.len())).then_some(q)
+    (gain > chance).then_some(q)
 }
 
 /// Logarithm of the odds against a step at any of so many places.
@@ -135,20 +142,11 @@ impl<'a> Search<'a> {
         let places = ((MOST - FEWEST) * DENSITY) as usize;
         let spacing = 1.0 / (DENSITY * self.range);
         // Turned by the same angle from one frequency to the next: one product of complex numbers for each.
-        let turns: Vec<(f64, f64)> = self.values.iter().map(|v| self.turned(*v, spacing)).collect();
+        let (sin, cos): (Vec<f64>, Vec<f64>) = self.values.iter().map(|v| self.turned(*v, spacing)).unzip();
         let first = self.values.iter().map(|v| self.turned(*v, self.at(0)));
-        let mut now: Vec<(f64, f64)> = first.zip(self.weights).map(|((s, c), w)| (w * s, w * c)).collect();
-        let mut sizes = Vec::with_capacity(places);
-        for _ in 0..places {
-            let (mut re, mut im) = (0.0, 0.0);
-            for (n, t) in now.iter_mut().zip(&turns) {
-                im += n.0;
-                re += n.1;
-                *n = (n.0 * t.1 + n.1 * t.0, n.1 * t.1 - n.0 * t.0);
-            }
-            sizes.push(f64::hypot(re, im) / self.norm);
-        }
-        sizes
+        let (mut im, mut re): (Vec<f64>, Vec<f64>) = first.zip(self.weights).map(|((s, c), w)| (w * s, w * c)).unzip();
+        let size = |(x, y): (f64, f64)| f64::hypot(x, y) / self.norm;
+        (0..places).map(|_| size(turn(&mut re, &mut im, &cos, &sin))).collect()
     }
 
     /// The frequency of the peak at a place, which is as wide as the search's spacing, to a thousandth of it.

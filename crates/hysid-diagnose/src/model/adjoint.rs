@@ -85,8 +85,8 @@ mod tests {
     use hysid_plant::{Drive, Simulation, Slot};
 
     use crate::data::DataSet;
-    use crate::evidence::dot;
     use crate::model::{Model, Values};
+    use hysid_linalg::dot;
 
     /// The adjoint against forward tangents: of a pulse, and of a slow signal, for an oscillator that is softer where it is far out.
     #[test]

@@ -4,12 +4,13 @@
 //! that is right leaves of it; once that stands in the equations and is refitted they mend nothing, and on another recording they harm. Terms that are
 //! missing show around it then.
 
+use hysid_linalg::dot;
 use hysid_plant::Simulation;
 
 use super::written::Sparse;
 use super::{OpenSet, Writable, correction};
 use crate::budget::Step;
-use crate::evidence::{dot, norm2};
+use crate::evidence::norm2;
 use crate::file::TermRecord;
 use crate::model::Values;
 use crate::model::base::Base;

@@ -1,6 +1,8 @@
 //! Columns beside a simulation's own tangents: their coefficients by least squares.
 
-use crate::evidence::{Whitener, dot, norm2};
+use hysid_linalg::dot;
+
+use crate::evidence::{Whitener, norm2};
 use crate::model::base::Base;
 
 /// Least squares of the residual on these columns beside the simulation's own tangents, with these weights of the whitened rows: the columns'

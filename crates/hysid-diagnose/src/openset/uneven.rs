@@ -8,9 +8,10 @@
 //!
 //! Reference: I. Verdinelli, L. Wasserman, Computing Bayes factors using a generalization of the Savage-Dickey density ratio, JASA 90 (1995).
 
+use hysid_linalg::dot;
 use hysid_plant::Expr;
 
-use crate::evidence::{dot, norm2};
+use crate::evidence::norm2;
 use crate::model::along;
 use crate::model::base::{Base, NoiseKind};
 use crate::model::hypothesis::Effect;

@@ -6,6 +6,7 @@
 //! noise. A walk pays for what the recording settles of it ([`Wander`]); an oscillation pays for two amplitudes, and for the lines and parameters among
 //! which it was found; what follows a signal for one, along a curve for two, and for the signals and parameters.
 
+use hysid_linalg::dot;
 use hysid_plant::Simulation;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -16,7 +17,7 @@ use super::followed::{Signal, Way};
 use super::modulation::{Modulated, modulated};
 use super::regress::regress;
 use super::view::View;
-use crate::evidence::{Wander, Whitener, dot, lines, norm2};
+use crate::evidence::{Wander, Whitener, lines, norm2};
 use crate::file::TermRecord;
 use crate::mechanism::SLOW;
 use crate::model::Count;

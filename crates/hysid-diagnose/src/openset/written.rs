@@ -216,12 +216,13 @@ mod tests {
 
     use super::*;
     use crate::data::DataSet;
-    use crate::evidence::{dot, norm2};
+    use crate::evidence::norm2;
     use crate::model::base::{NoiseKind, Start, fit_simulation};
     use crate::model::{Model, Values};
     use crate::openset::terms::terms;
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::refit::LmOptions;
+    use hysid_linalg::dot;
 
     #[test]
     fn a_term_grows_in_proportion_to_a_coordinate_or_curves() {

@@ -6,11 +6,12 @@
 //!
 //! Reference: J. J. More (1978), the scaling; H. B. Nielsen (1999), the damping.
 
+use hysid_linalg::dot;
 use nalgebra::DMatrix;
 
 use super::normal::{System, Weighting};
 use super::options::LmOptions;
-use crate::evidence::{Layout, Whitener, dot, norm2};
+use crate::evidence::{Layout, Whitener, norm2};
 
 /// A stack of predictions that depends on parameters.
 pub trait Problem: Sync {

@@ -1,8 +1,9 @@
 //! Weighted rows, and the normal equations that a step is taken from.
 
+use hysid_linalg::dot;
 use nalgebra::{DMatrix, DVector};
 
-use crate::evidence::{Layout, Whitener, dot, norm2};
+use crate::evidence::{Layout, Whitener, norm2};
 
 /// How rows count: whitened, then multiplied by these weights (0 leaves a row out).
 #[derive(Clone, Copy)]

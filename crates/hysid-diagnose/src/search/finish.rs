@@ -1,7 +1,6 @@
 //! How the fit of an effect ends: shapes that least squares cannot move (a time, a period, a knee) are scanned, then all of it is fitted under the
 //! noise that is left.
 
-use super::gentle::take_gentlest;
 use super::profile::profile_shapes;
 use crate::budget::Step;
 use crate::model::base::Base;
@@ -22,7 +21,6 @@ pub fn finish<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
         h.base = p;
     }
     h.log_evidence = setting.evidence(&h.base);
-    take_gentlest(setting, h, from);
 }
 
 /// Where the noise of a fit has a slight colour: the fit that begins under white noise, if that is likelier.

@@ -19,9 +19,9 @@ const AS_GOOD: f64 = 0.5;
 /// Iterations of a fit.
 const ITERATIONS: usize = 8;
 
-/// Takes the gentlest strengths of effects that begin beyond a knee, of those from `from` on, where their strength is not determined.
-pub fn take_gentlest<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>, from: usize) {
-    let knees = h.effects[from..].iter().filter(|e| e.written.shapes.iter().any(|s| s.searched));
+/// Takes the gentlest strengths of effects that begin beyond a knee, where their strength is not determined.
+pub fn take_gentlest<'d>(setting: &Setting<'d>, h: &mut Hypothesis<'d>) {
+    let knees = h.effects.iter().filter(|e| e.written.shapes.iter().any(|s| s.searched));
     let names: Vec<String> = knees.flat_map(|e| e.written.amplitudes.iter().map(|a| a.name.clone())).collect();
     for name in names {
         if setting.budget.omits(Step::Fits) {
@@ -111,7 +111,7 @@ pub mod tests {
             assert!(of(&violent, "c_o") > 2.0);
             let likelihood = violent.log_likelihood;
             let mut taken = setting.hypothesis(h.effects.clone(), violent);
-            take_gentlest(setting, &mut taken, 0);
+            take_gentlest(setting, &mut taken);
             assert!(of(&taken.base, "c_o") < 0.3 && taken.base.log_likelihood > likelihood - AS_GOOD);
             assert!((of(&taken.base, "s_max") - BRIM).abs() < 0.3);
         });

@@ -6,11 +6,12 @@
 
 use std::ops::Range;
 
+use hysid_linalg::dot;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::screen::Candidate;
-use crate::evidence::{FeatureGroup, dot, norm2, score};
+use crate::evidence::{FeatureGroup, norm2, score};
 use crate::model::hypothesis::are_one_law;
 
 /// Candidates of which all pairs are compared.
