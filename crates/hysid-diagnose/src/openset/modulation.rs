@@ -3,7 +3,7 @@
 //! The response to a signal at such an input is the derivative by the modulation's amplitude, exactly, wherever the parameter stands; the adjoint
 //! gives the score of a modulation at every instant.
 
-use hysid_plant::{Compiled, Expr, Input, Memory, Simulation, Slot as Place};
+use hysid_plant::{BinaryOp, Compiled, Expr, Input, Memory, Simulation, Slot as Place};
 use rayon::prelude::*;
 
 use crate::data::DataSet;
@@ -28,7 +28,7 @@ pub fn modulated(base: &Base<'_>) -> Vec<String> {
     let inputs = simulation.inputs.iter().filter(|_| !simulation.is_static()).map(|u| u.symbol.clone());
     (0..own)
         .filter_map(|place| base.model.name_of(place))
-        .filter(|name| values.parameters.get(*name).is_some_and(|v| *v != 0.0))
+        .filter(|name| values.parameters.get(*name).is_some_and(|v| *v != 0.0) && !is_a_share(simulation, name))
         .map(str::to_owned)
         .chain(inputs)
         .filter(|symbol| {
@@ -38,6 +38,24 @@ pub fn modulated(base: &Base<'_>) -> Vec<String> {
         })
         .take(MOST)
         .collect()
+}
+
+/// Whether a symbol only stands for the share by which something else changes with the time, as `epsilon` in `R*(1 + epsilon*t)`: what varies there is that.
+fn is_a_share(simulation: &Simulation, symbol: &str) -> bool {
+    let of_time = |e: &Expr| e.uses("t") && e.symbols().iter().all(|s| s == "t" || simulation.parameter(s).is_some());
+    let (mut everywhere, mut as_a_share) = (0, 0);
+    for (_, equation) in simulation.expressions() {
+        equation.visit(&mut |e| {
+            everywhere += usize::from(*e == Expr::symbol(symbol));
+            if let Expr::Binary(BinaryOp::Add | BinaryOp::Sub, ..) = e {
+                let terms = e.terms();
+                let relative = terms.iter().any(|(_, term)| matches!(term, Expr::Number(_)));
+                let own = terms.iter().filter(|(_, term)| term.uses(symbol) && of_time(term)).count();
+                as_a_share += if relative { own } else { 0 };
+            }
+        });
+    }
+    everywhere > 0 && as_a_share >= everywhere
 }
 
 /// Multiplies a symbol in every equation; the time by which inputs are delayed, which has to stand still, to first order: `delay(u, T)` becomes
@@ -133,5 +151,27 @@ impl<'d> Modulated<'d> {
         let all = self.model.scores(&self.theta, noise, residuals)?;
         let of_places = |mut by: Vec<Vec<Vec<f64>>>| self.places.iter().map(|&i| std::mem::take(&mut by[i])).collect();
         Some(all.into_iter().map(of_places).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_of_a_change_with_time_varies_in_the_place_of_what_changes() {
+        let share = |derivative: &str, output: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.1\n[inputs]\nu = \"u\"\n[parameters]\nR = {{ value = 1.0, min = 0.1 }}\nq = {{ value = 0.2, min = 0.1 }}\n[states]\n\
+                 s = {{ derivative = \"{derivative}\", initial = 0.0 }}\n[outputs]\ny = \"{output}\"\n"
+            );
+            is_a_share(&Simulation::parse(&text, "share.sim.toml").unwrap(), "q")
+        };
+        assert!(share("u/(R*(1 + q*(1 - exp(-t/3)))) - s", "s"));
+        assert!(share("u*R*(1 - q*t) - s", "s*(1 + q*t)"));
+        // A drift of its own, a share that follows a state, and one that stands elsewhere too.
+        assert!(!share("u*R - s", "s + q*t"));
+        assert!(!share("u*R*(1 + q*s) - s", "s"));
+        assert!(!share("u*R*(1 + q*t) - s", "q*s"));
     }
 }

@@ -1,11 +1,11 @@
 //! The power that a moving part dissipates: of the terms of its equation those that its own velocity makes, times that velocity; and the slip at which a damper
 //! between two parts does.
 
-use hysid_plant::Expr;
+use hysid_plant::{BinaryOp, Expr};
 
 use super::Slot;
-use super::algebra::{coefficient, only_parameters, product, signals_in};
-use super::find::Finder;
+use super::algebra::{Factors, coefficient, only_parameters, product, signals_in};
+use super::find::{Finder, has_unit};
 use super::motion::{Kinematic, Motion, force_of};
 use super::pattern::factors;
 
@@ -38,6 +38,38 @@ impl Finder<'_> {
         };
         let first = found.first()?;
         found.iter().all(|e| ends(e) == ends(first)).then(|| first.clone())
+    }
+
+    /// The current that a voltage drives through a resistance, as `(u - K*w)/R`, where it is the same in all equations.
+    pub(super) fn driven_current(&self, resistance: &str) -> Option<Expr> {
+        if !has_unit(self.simulation.unit_of(resistance), &["Ohm"]) {
+            return None;
+        }
+        let mut voltages = Vec::new();
+        let mut uses = 0;
+        for equation in self.equations() {
+            self.over(&equation, resistance, &mut voltages);
+            equation.visit(&mut |e| uses += usize::from(*e == Expr::symbol(resistance)));
+        }
+        let first = voltages.first()?;
+        let same = voltages.len() == uses && voltages.iter().all(|v| v == first);
+        (same && !only_parameters(self.simulation, first)).then(|| first.clone() / Expr::symbol(resistance))
+    }
+
+    /// Collects what is no parameter of each product that is divided by this one.
+    fn over(&self, expr: &Expr, divisor: &str, found: &mut Vec<Expr>) {
+        match expr {
+            Expr::Binary(BinaryOp::Mul | BinaryOp::Div, ..) | Expr::Neg(_) => {
+                let Factors { above, below, .. } = Factors::of(expr.clone());
+                above.iter().chain(&below).for_each(|f| self.over(f, divisor, found));
+                if below.contains(&Expr::symbol(divisor)) {
+                    found.push(product(above.into_iter().filter(|f| !only_parameters(self.simulation, f)).collect()));
+                }
+            }
+            Expr::Binary(_, a, b) => [a, b].iter().for_each(|e| self.over(e, divisor, found)),
+            Expr::Call(_, all) | Expr::Memory(_, all) => all.iter().for_each(|e| self.over(e, divisor, found)),
+            Expr::Number(_) | Expr::Symbol(_) => {}
+        }
     }
 
     /// Offers what a part dissipates by all of its terms as `heat`; of one term alone nothing, since its power is the speed or its square. Nothing either where
@@ -128,5 +160,26 @@ mod tests {
         let rate = |name: &str| at(name).quantity("v").map(|q| q.expression.to_string());
         assert_eq!(["R", "b", "K"].map(rate), ["i", "w", "w"].map(|v| Some(v.to_owned())));
         assert!(at("R").dissipates());
+    }
+
+    #[test]
+    fn a_winding_without_inductance_is_heated_by_its_current() {
+        let rate = |unit: &str, derivative: &str, output: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nu = \"u_V\"\n[parameters]\nR = {{ value = 1.0, min = 0.1, unit = \"{unit}\" }}\nK = {{ value = 0.05, min = 0.01 }}\n\
+                 J = {{ value = 0.1, min = 0.01 }}\n[states]\nw = {{ derivative = \"{derivative}\", initial = 0.0, unit = \"rad/s\" }}\n[outputs]\ni_A = \"{output}\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "motor.sim.toml").unwrap()).slots;
+            let slot = slots.into_iter().find(|s| s.label == "parameter:R").unwrap();
+            (slot.quantity("v").map(|q| q.expression.to_string()), slot.dissipates())
+        };
+        let current = (Some("(u - K*w)/R".to_owned()), true);
+        assert_eq!(rate("Ohm", "(K*(u - K*w)/R - 0.1*w)/J", "(u - K*w)/R"), current);
+        assert_eq!(rate("Ohm", "K/R*(u - K*w)/J", "(u - K*w)/R"), current);
+        // Of another unit, two voltages, and where it divides and multiplies.
+        let turning = |found: (Option<String>, bool)| assert_eq!(found.0.as_deref(), Some("w"));
+        turning(rate("K/W", "(K*(u - K*w)/R - 0.1*w)/J", "(u - K*w)/R"));
+        turning(rate("Ohm", "(K*(u - K*w)/R - 0.1*w)/J", "(u - w)/R"));
+        turning(rate("Ohm", "(K*(u - K*w)/R - 0.1*w)/J", "(u - w)*R"));
     }
 }

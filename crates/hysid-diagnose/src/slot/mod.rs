@@ -270,11 +270,12 @@ impl Slot {
         self.turns
     }
 
-    /// Whether the slot is a parameter that dissipates power: one that a velocity is multiplied by.
+    /// Whether the slot is a parameter that dissipates power: one that a velocity or a current is multiplied by, or that makes the current.
     pub(crate) fn dissipates(&self) -> bool {
         let (Some(parameter), Some(v)) = (self.quantity("p"), self.quantity("v")) else { return false };
         let uses = |e: &Expr, quantity: &Quantity| quantity.expression.symbols().iter().any(|s| e.uses(s));
-        let mut found = false;
+        // A current that falls as the resistance grows.
+        let mut found = uses(&v.expression, parameter);
         for equation in &self.context {
             equation.visit(&mut |e| {
                 if let Expr::Binary(hysid_plant::BinaryOp::Mul, a, b) = e {
