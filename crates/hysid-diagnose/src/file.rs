@@ -224,7 +224,7 @@ pub struct RemainingRecord {
 /// A sparse correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrectionRecord {
-    /// Where it is added.
+    /// Where the term that explains most is added.
     pub slot: String,
     /// Its terms.
     pub terms: Vec<TermRecord>,
@@ -246,6 +246,8 @@ impl CorrectionRecord {
 pub struct TermRecord {
     /// In the notation of `fit.json`.
     pub term: String,
+    /// Where it is added: the terms of one law may stand in several equations.
+    pub slot: String,
     /// Its coefficient.
     pub coefficient: f64,
     /// Its error reduction ratio.

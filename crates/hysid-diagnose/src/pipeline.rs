@@ -35,6 +35,7 @@ use crate::text::number;
 use crate::verdict::elsewhere::elsewhere;
 use crate::verdict::judgement::Judgement;
 use crate::verdict::reliability::recalibrate;
+use crate::verdict::remaining::left_by;
 use crate::verdict::trifles::Trifle;
 
 /// The outcome of a diagnosis.
@@ -334,6 +335,9 @@ fn written<'d>(
     };
     let strayed = modelled.as_ref().is_some_and(|h| astray(&search.setting, &pool[0].base, &h.base));
     let modelled = modelled.filter(|_| !strayed);
+    if let Some(h) = &modelled {
+        file.remaining = left_by(search, &pool[0], h);
+    }
     let note = if modelled.is_some() {
         "the augmented simulation holds the sparse correction, refitted, and no physics that has a name: it predicts blocks of the recordings that it was not fitted to better, and says nothing outside their range"
     } else if strayed {

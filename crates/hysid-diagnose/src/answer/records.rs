@@ -348,7 +348,9 @@ mod tests {
     #[test]
     fn a_correction_has_the_place_of_its_loudest_term() {
         let place = |slot: &str, side: &str, memory: &str, terms: &[(&str, f64)]| {
-            let terms = terms.iter().map(|(t, err)| TermRecord { term: (*t).into(), coefficient: 1.0, err: *err });
+            let term =
+                |&(t, err): &(&str, f64)| TermRecord { term: t.into(), slot: slot.into(), coefficient: 1.0, err };
+            let terms = terms.iter().map(term);
             let signature = SignatureRecord {
                 memory: memory.into(),
                 rate_dependent: false,

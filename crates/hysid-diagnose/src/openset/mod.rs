@@ -173,7 +173,12 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
         .iter()
         .zip(&best.coefficients)
         .zip(&best.err)
-        .map(|((&i, c), err)| TermRecord { term: terms[i].text.clone(), coefficient: *c, err: *err })
+        .map(|((&i, c), err)| TermRecord {
+            term: terms[i].text.clone(),
+            slot: terms[i].slot.clone(),
+            coefficient: *c,
+            err: *err,
+        })
         .collect();
     let signature = signature(base, terms, &best.left, &best.terms, &best.coefficients);
     // A term that is a function of the time in this recording, beside others that are not, mends what those leave of the mismatch on the tangent, and
@@ -204,11 +209,10 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
 fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
     let columns: Vec<&[f64]> = found.columns.iter().map(Vec::as_slice).collect();
     let what = &found.what;
-    let place = if what.input { "input" } else { "parameter" };
     let side = if matches!(what.course, Course::Follows(_)) { "plant" } else { "time" };
     let signature =
         SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "odd".into(), side: side.into() };
-    let (slot, terms) = (format!("{place}:{}", what.symbol), what.terms(&found.err));
+    let (slot, terms) = (what.slot(), what.terms(&found.err));
     OpenSet {
         record: CorrectionRecord { slot, terms, signature, ratio: None },
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),

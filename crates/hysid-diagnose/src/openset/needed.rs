@@ -90,8 +90,7 @@ fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, open: &OpenSet, le
         best = longer;
     }
     let terms = told(parent, &best)?;
-    let loudest = terms.iter().zip(best.sparse.slots()).max_by(|(a, _), (b, _)| a.err.total_cmp(&b.err));
-    let slot = loudest.map(|(_, slot)| slot.to_owned());
+    let slot = terms.iter().max_by(|a, b| a.err.total_cmp(&b.err)).map(|t| t.slot.clone());
     Some(Refitted { hypothesis: best.hypothesis, terms, slot, of: open.clone() })
 }
 
@@ -101,16 +100,17 @@ fn told(parent: &Hypothesis<'_>, best: &Fit<'_>) -> Option<Vec<TermRecord>> {
     let white = |x: &[f64]| base.whitener.apply(&base.model.data().layout, x);
     let r = white(&parent.base.fit.residual);
     let fitted = fitted_values(best)?;
-    let of = |((text, values), names): ((String, &Vec<f64>), &Vec<String>)| {
+    let of = |(((term, slot), values), names): (((String, &str), &Vec<f64>), &Vec<String>)| {
         let (name, coefficient) = (names.first()?, *values.first()?);
         let column = white(base.fit.jacobian.get(base.model.place_of(name)?)?);
         Some(TermRecord {
-            term: text,
+            term,
+            slot: slot.to_owned(),
             coefficient,
             err: coefficient * dot(&column, &r) / norm2(&r).max(f64::MIN_POSITIVE),
         })
     };
-    best.sparse.texts(&fitted).zip(&fitted).zip(&best.names).map(of).collect()
+    best.sparse.texts(&fitted).zip(best.sparse.slots()).zip(&fitted).zip(&best.names).map(of).collect()
 }
 
 /// A simulation with terms in it, fitted from these values.

@@ -105,10 +105,19 @@ impl Variation {
         format!("{what} `{}` {how}", self.symbol)
     }
 
+    /// Its place.
+    pub fn slot(&self) -> String {
+        format!("{}:{}", if self.input { "input" } else { "parameter" }, self.symbol)
+    }
+
     /// Its courses as terms, the one that explains most first, with these shares of the residual's power.
     pub fn terms(&self, err: &[f64]) -> Vec<TermRecord> {
-        let term =
-            |((text, &coefficient), &err)| TermRecord { term: format!("{}*{text}", self.symbol), coefficient, err };
+        let term = |((text, &coefficient), &err)| TermRecord {
+            term: format!("{}*{text}", self.symbol),
+            slot: self.slot(),
+            coefficient,
+            err,
+        };
         let mut terms: Vec<TermRecord> = self.texts.iter().zip(&self.amplitudes).zip(err).map(term).collect();
         terms.sort_by(|a, b| b.err.total_cmp(&a.err));
         terms.truncate(MOST_TERMS);

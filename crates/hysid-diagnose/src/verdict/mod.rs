@@ -9,7 +9,7 @@ pub(crate) mod firmness;
 pub(crate) mod judgement;
 mod place;
 pub mod reliability;
-mod remaining;
+pub(crate) mod remaining;
 pub(crate) mod trifles;
 mod veto;
 mod wanders;

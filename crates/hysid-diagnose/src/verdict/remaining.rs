@@ -244,6 +244,12 @@ fn in_place<'d>(
     }
 }
 
+/// What a simulation leaves that is written in the place of the judged set; `None` where there is no time to look.
+pub fn left_by(search: &Search<'_, '_>, none: &Hypothesis<'_>, written: &Hypothesis<'_>) -> Option<RemainingRecord> {
+    let looked = !search.setting.budget.omits(Step::Remains);
+    looked.then(|| RemainingRecord { p_value: search.remains(written).p_value, share: share(written, none) })
+}
+
 /// The noise that the best model leaves, by output: what cannot be told of its residual from its own past. Plain squares take all of the residual for noise,
 /// however smooth it is.
 fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {

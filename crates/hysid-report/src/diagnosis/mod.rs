@@ -254,9 +254,10 @@ fn correction(page: &mut Page, file: &DiagnosisFile) {
     );
     let rate = if s.rate_dependent { "depends on the rate" } else { "does not depend on the rate" };
     page.text(&format!("Memory: {}; {rate}; symmetry: {}; side: {}.", words::plain(&s.memory), s.symmetry, s.side));
-    let mut table = Table::new(&[("term", Align::Left), ("coefficient", Align::Right), ("ERR", Align::Right)]);
+    let columns = [("term", Align::Left), ("at", Align::Left), ("coefficient", Align::Right), ("ERR", Align::Right)];
+    let mut table = Table::new(&columns);
     for t in &correction.terms {
-        table.row([t.term.clone(), number(t.coefficient), percent(t.err)]);
+        table.row([t.term.clone(), t.slot.clone(), number(t.coefficient), percent(t.err)]);
     }
     page.table(&table);
 }
