@@ -28,8 +28,9 @@ const INDIFFERENT: f64 = 0.1;
 const TIE: f64 = 3.0;
 /// Log likelihood by which one that ties must lead to be taken.
 const LESS_LEFT: f64 = 1.0;
-/// Iterations of a fit that tells from which start a form is fitted.
+/// Iterations of a fit that tells from which start a form is fitted, and log evidence by which it may trail then and still be fitted to the end.
 const SKETCH: usize = 3;
+const TRAILING: f64 = 40.0;
 /// Most starts of a form.
 const MOST_STARTS: usize = 4;
 
@@ -123,7 +124,8 @@ fn written_as<'d>(
         parts[index - first] = Part { purpose, values: start, ..Part::of_effect(effect, &values) };
         assemble(setting, trunk, &values, &parts, &h.base.whitener, SKETCH)
     });
-    let mut best = begun.max_by(|a, b| a.base.log_likelihood.total_cmp(&b.base.log_likelihood))?;
+    let best = begun.max_by(|a, b| a.base.log_likelihood.total_cmp(&b.base.log_likelihood));
+    let mut best = best.filter(|b| b.log_evidence > h.log_evidence - TRAILING)?;
     if let Some(base) = setting.further(&best.base, Some(&h.base.whitener), 1, setting.iterations) {
         best.base = base;
     }
