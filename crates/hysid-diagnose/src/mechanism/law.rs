@@ -66,6 +66,8 @@ pub struct LawParameter {
     pub floor: Option<(String, f64)>,
     /// Below that many times another measure the law looks like one of another kind, in words: nothing is firm there.
     pub told_from: Option<(String, f64, &'static str)>,
+    /// Whether it is a displacement up to which the law is elastic: nothing is firm where that is longer than the travel of `x`.
+    pub elastic: bool,
     /// The value at which the rewritten simulation is the baseline whatever the others are, in multiples of the measure.
     pub neutral: Option<f64>,
     /// Whether it is reported under its own name.
@@ -238,6 +240,7 @@ impl Law {
             range: None,
             floor: None,
             told_from: None,
+            elastic: false,
             neutral: None,
             reported: true,
             searched: false,
@@ -270,6 +273,12 @@ impl Law {
     pub fn told_from(self, times: f64, measure: &str, below: &'static str) -> Self {
         let told_from = Some((measure.to_owned(), times, below));
         self.last(|p| p.told_from = told_from)
+    }
+
+    /// The last parameter is a displacement up to which the law is elastic: beyond the travel of `x` it makes the law look like one of another kind.
+    #[must_use]
+    pub fn elastic(self) -> Self {
+        self.last(|p| p.elastic = true)
     }
 
     /// The value of the last parameter at which the simulation is the baseline, in multiples of its measure.

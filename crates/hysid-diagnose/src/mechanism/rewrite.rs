@@ -139,8 +139,10 @@ fn write_law(
                 let (searched, places) = (parameter.searched, Places::of(grid));
                 let from = parameter.told_from.as_ref();
                 let told_from = from.and_then(|(measure, times, below)| Some((multiple(*times, measure)?, *below)));
-                let (pointed, over) = (signals.pointed(grid).to_vec(), signals.over(grid));
-                shapes.push(Shape { name: name.clone(), grid: values, pointed, searched, places, over, told_from });
+                let travel = parameter.elastic.then(|| 2.0 * signals.reach("x")).filter(|travel| *travel > 0.0);
+                let (name, grid, pointed, over) =
+                    (name.clone(), values, signals.pointed(grid).to_vec(), signals.over(grid));
+                shapes.push(Shape { name, grid, pointed, searched, places, over, told_from, travel });
             }
             Role::Constant(grid) => {
                 new.value = signals.values(grid, size).first().copied().unwrap_or(size);

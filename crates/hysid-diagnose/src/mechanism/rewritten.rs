@@ -33,9 +33,21 @@ pub struct Shape {
     pub over: f64,
     /// The value below which the law looks like one of another kind on this recording, and that kind in words.
     pub told_from: Option<(f64, &'static str)>,
+    /// The travel beyond which a law that is elastic up to this displacement is a curved spring on this recording.
+    pub travel: Option<f64>,
 }
 
+/// What a loop is that yields at a longer way than the recording goes.
+const NEVER_YIELDS: &str =
+    "a loop that does not yield on the whole way that the recording goes is hardly more than a curved spring there";
+
 impl Shape {
+    /// What the law looks like at a value on this recording where that is one of another kind, in words.
+    pub fn confused(&self, value: f64) -> Option<&'static str> {
+        let elastic = self.travel.filter(|travel| value > *travel).map(|_| NEVER_YIELDS);
+        elastic.or_else(|| self.told_from.filter(|(from, _)| value < *from).map(|(_, below)| below))
+    }
+
     /// How far a value may be from the next that the recording tells from it: between two lines a whole cycle more or less, else the spacing of the grid.
     pub fn spacing(&self, value: f64) -> f64 {
         let lines = match self.places {
@@ -162,6 +174,24 @@ impl Rewritten {
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_law_is_confused_below_what_tells_it_and_beyond_the_travel() {
+        let shape = |told_from, travel| Shape {
+            name: "z_s".into(),
+            grid: vec![0.1],
+            pointed: Vec::new(),
+            searched: false,
+            places: Places::Any,
+            over: 1.0,
+            told_from,
+            travel,
+        };
+        let of = |shape: Shape| [0.05, 0.3, 1.2].map(|value| shape.confused(value).is_some());
+        assert_eq!(of(shape(None, None)), [false; 3]);
+        assert_eq!(of(shape(None, Some(1.0))), [false, false, true]);
+        assert_eq!(of(shape(Some((0.1, "another")), Some(1.0))), [true, false, true]);
+    }
+
     /// Between two lines that a recording just tells apart there is one cycle more over its length, one turn more over its travel.
     #[test]
     fn the_spacing_of_lines_is_that_of_whole_cycles() {
@@ -173,6 +203,7 @@ mod tests {
             places,
             over,
             told_from: None,
+            travel: None,
         };
         let (travel, period) = (500.0, 0.4);
         let next = period + shape(Places::Turns, travel).spacing(period) / LOBES;

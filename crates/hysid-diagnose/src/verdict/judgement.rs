@@ -54,6 +54,8 @@ pub struct Judgement<'d> {
 const LIKELY: f64 = 0.5;
 /// Share of the level below which a mismatch must be that no set and no generic term supports.
 const UNSUPPORTED: f64 = 0.5;
+/// Share of the mismatch beside which nothing is firm, where a random force explains it.
+const MOSTLY: f64 = 0.5;
 /// Share of the log evidence that the members which do not wander must bring by themselves to be written without the others.
 const STEADY: f64 = 0.5;
 
@@ -97,8 +99,11 @@ impl<'d> Judgement<'d> {
         // On four turns a play and a sum of plays are one law: what a law needs to be told from its neighbours it needs to be told firmly.
         let lacking = lacking(best, candidates);
         support.iter_mut().zip(&lacking).filter(|(_, l)| l.is_some()).for_each(|(s, _)| s.weaken());
+        let remaining = rest.record(pool, winner);
+        // Where most of the mismatch is left, and a random force explains that, what the effects gain is as likely a part of what the force does.
+        let pushed = rest.pushed && remaining.as_ref().is_some_and(|r| r.share > MOSTLY);
         // A search that was cut short has not heard all rivals.
-        if unfinished() || rest.is_unequal() {
+        if unfinished() || rest.is_unequal() || pushed {
             support.iter_mut().for_each(Support::weaken);
         }
         // Where one of several effects that only the second look sees is not known, the others may be parts of the same imitation (development seed
@@ -116,7 +121,6 @@ impl<'d> Judgement<'d> {
         // A mismatch that is significant stays one, though nothing that was fitted in time explains it.
         let cut_short = significant && winner == 0 && unfinished();
         let mut within = if cut_short { VerdictKind::Ambiguous } else { verdict_of(&support) };
-        let remaining = rest.record(pool, winner);
         let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
             || wandering.iter().flatten().any(|w| w.is_sure(search.options.alpha));
         let outside = elsewhere || rest.is_outside(&support, remaining.as_ref());
@@ -214,11 +218,8 @@ fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String
     let told = |e: &Effect| {
         let id = e.mechanism.id;
         let at_an_end = best.changes_at_an_end(e).then_some(AT_AN_END);
-        let confused = e.written.shapes.iter().find_map(|shape| {
-            let value = *values.parameters.get(&shape.name)?;
-            let (from, below) = shape.told_from?;
-            (value < from).then_some(below)
-        });
+        let shapes = e.written.shapes.iter();
+        let confused = shapes.filter_map(|s| s.confused(*values.parameters.get(&s.name)?)).next();
         if let Some(confused) = at_an_end.or(confused) {
             return Some(format!("{id}: this is not firm, since {confused}"));
         }

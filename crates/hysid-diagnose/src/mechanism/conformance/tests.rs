@@ -1,5 +1,5 @@
 use super::*;
-use crate::mechanism::Form;
+use crate::mechanism::{Family, Form};
 use crate::slot::Place;
 
 #[test]
@@ -226,6 +226,26 @@ fn what_is_held_or_wound_beside_a_motion_is_found() {
 }
 
 /// Heat that follows within a period of the motion is told from there on, in seconds.
+#[test]
+fn what_yields_is_told_within_the_travel_only() {
+    let mut seen = 0;
+    for simulation in specimens() {
+        let structure = Structure::of(&simulation);
+        for m in catalogue() {
+            let yields = matches!(m.family, Family::Presliding | Family::HystereticSpring);
+            for slot in m.slots(&structure).into_iter().filter(|slot| slot.place != Place::Loop) {
+                let signals = example_signals(&simulation, &slot);
+                let written = m.rewrite(&simulation, &slot, &signals, Purpose::Refit).unwrap();
+                let travels: Vec<f64> = written.shapes.iter().filter_map(|s| s.travel).collect();
+                let expected = if yields { vec![2.0 * signals.reach("x")] } else { Vec::new() };
+                assert_eq!(travels, expected, "{} at {}", m.id, slot.label);
+                seen += travels.len();
+            }
+        }
+    }
+    assert!(seen > 0);
+}
+
 #[test]
 fn the_period_of_the_motion_is_the_least_time_constant_of_heat() {
     let mut seen = 0;

@@ -19,6 +19,7 @@ pub static ASYMMETRIC_BOUC_WEN: Mechanism = Mechanism {
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 3.0, 4))
+            .elastic()
             .within(0.02, 20.0)
             .at_least(0.2, "v*h")
             .detail(purpose, "b", "1", vec![0.5], (0.3, 5.0))

@@ -18,6 +18,7 @@ pub static DEGRADATION: Mechanism = Mechanism {
         Law::force("F_h*z")
             .amplitude("F_h", "F", 0.0, 2.0)
             .shape("x_y", "x", log_grid(0.1, 2.0, 4))
+            .elastic()
             .within(0.02, 20.0)
             .at_least(0.2, "v*h")
             .shape("d_A", "x/(v*T)", Grid::Values(vec![0.5]))

@@ -15,6 +15,7 @@ pub static DAHL_FRICTION: Mechanism = Mechanism {
         Law::force("F_c*z")
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.02, 1.0, 5))
+            .elastic()
             .within(5e-4, 5.0)
             .at_least(0.03, "v*h")
             .relaxing("z", "v - abs(v)*z", "z_s")

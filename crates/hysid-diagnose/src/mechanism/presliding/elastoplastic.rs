@@ -15,6 +15,7 @@ pub static ELASTOPLASTIC_FRICTION: Mechanism = Mechanism {
         Law::force("F_c*z")
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.03, 1.0, 4))
+            .elastic()
             .within(5e-4, 5.0)
             .at_least(0.03, "v*h")
             .shape("z_b", "1", Grid::Values(vec![0.3, 0.7]))

@@ -15,6 +15,7 @@ pub static LUGRE_FRICTION: Mechanism = Mechanism {
         Law::force("F_c*(z + t_1*(v - abs(v)*z/(1 + r_s*exp(-(v/v_s)^2)))/max(z_s, s_h*abs(v)))")
             .amplitude("F_c", "F", 0.0, 1.0)
             .shape("z_s", "x", log_grid(0.03, 0.5, 3))
+            .elastic()
             .within(5e-4, 5.0)
             .at_least(0.03, "v*h")
             .shape("v_s", "v", log_grid(0.03, 0.5, 2))
