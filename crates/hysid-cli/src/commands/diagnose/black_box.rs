@@ -19,8 +19,6 @@ use crate::commands::files::{Intake, SAME_PERIOD};
 const SOUND: f64 = 3.0;
 /// Longer recordings than this in all are used in the windows of the diagnosis: memory and time stay what they are.
 const MOST_SAMPLES: usize = 30_000;
-/// Terms of a model.
-const MOST_TERMS: usize = 15;
 /// Samples of a window that is worth it.
 const SHORTEST: usize = 100;
 
@@ -130,8 +128,7 @@ fn model(source: Source<'_>, seed: u64, stop: Stop<'_>) -> Result<NarxModel, Ide
     let quiet = |_: &str| {};
     let mut best: Option<(f64, NarxModel)> = None;
     for lags in [None, Some(6), Some(3), Some(2)] {
-        let options =
-            Options { lags_output: lags, lags_input: lags, terms: Some(MOST_TERMS), seed, ..Options::default() };
+        let options = Options { lags_output: lags, lags_input: lags, seed, ..Options::default() };
         let linear = Options { degree: Some(1), factors: Factors::Polynomial, ..options.clone() };
         let linear = match (identify_until(source, &linear, &quiet, stop), &best) {
             (Ok(linear), _) => linear,
