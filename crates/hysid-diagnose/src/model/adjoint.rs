@@ -82,11 +82,11 @@ impl Model<'_> {
 
 #[cfg(test)]
 mod tests {
+    use hysid_linalg::dot;
     use hysid_plant::{Drive, Simulation, Slot};
 
     use crate::data::DataSet;
     use crate::model::{Model, Values};
-    use hysid_linalg::dot;
 
     /// The adjoint against forward tangents: of a pulse, and of a slow signal, for an oscillator that is softer where it is far out.
     #[test]

@@ -22,8 +22,6 @@ pub struct Refitted<'d> {
     pub hypothesis: Hypothesis<'d>,
     /// The terms that it needs there, as they were fitted; none for a parameter that oscillates.
     pub terms: Vec<TermRecord>,
-    /// The slot of the loudest of them.
-    pub slot: Option<String>,
     /// What the tangent said of it; a parameter that varies as it was fitted.
     pub of: OpenSet,
 }
@@ -77,7 +75,7 @@ fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, open: &OpenSet, le
                 if leads { other } else { best }
             })?;
             let of = open.fitted(varied.fitted(form, &hypothesis.base.values())?);
-            return Some(Refitted { hypothesis, terms: Vec::new(), slot: None, of });
+            return Some(Refitted { hypothesis, terms: Vec::new(), of });
         }
         Writable::Sparse(sparse) => sparse.clone(),
     };
@@ -90,8 +88,7 @@ fn fitted<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, open: &OpenSet, le
         best = longer;
     }
     let terms = told(parent, &best)?;
-    let slot = terms.iter().max_by(|a, b| a.err.total_cmp(&b.err)).map(|t| t.slot.clone());
-    Some(Refitted { hypothesis: best.hypothesis, terms, slot, of: open.clone() })
+    Some(Refitted { hypothesis: best.hypothesis, terms, of: open.clone() })
 }
 
 /// The terms of a correction as they were fitted, each with the share of the residual's power, before any of them, that it explains.

@@ -212,6 +212,7 @@ fn degree(e: &Expr, symbol: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use hysid_linalg::dot;
     use hysid_signal::{Channel, Clock, Recording};
 
     use super::*;
@@ -222,7 +223,6 @@ mod tests {
     use crate::openset::terms::terms;
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
     use crate::refit::LmOptions;
-    use hysid_linalg::dot;
 
     #[test]
     fn a_term_grows_in_proportion_to_a_coordinate_or_curves() {

@@ -150,7 +150,7 @@ impl<'d> Remaining<'d> {
                 both.max_by(|(a, _), (b, _)| a.hypothesis.log_evidence.total_cmp(&b.hypothesis.log_evidence))?
             }
         };
-        let Refitted { hypothesis: best, terms, slot, of } = refitted;
+        let Refitted { hypothesis: best, terms, of } = refitted;
         let sure = replaced || self.stands_by_evidence(&of);
         let driven = pool[otherwise].base.driven() && best.base.driven();
         if leaves_more(&best, &pool[otherwise]) && !driven {
@@ -160,8 +160,10 @@ impl<'d> Remaining<'d> {
         let (_, after) = block_score(setting, &best)?;
         let ratio = (after.iter().sum::<f64>() / before.iter().sum::<f64>()).sqrt();
         let better = ratio < 1.0;
-        let slot = slot.unwrap_or_else(|| of.record.slot.clone());
-        let record = CorrectionRecord { slot, terms, ratio: finite(ratio), ..of.record.clone() };
+        let mut record = CorrectionRecord { terms, ratio: finite(ratio), ..of.record.clone() };
+        if let Some(slot) = record.loudest().map(|t| t.slot.clone()) {
+            record.slot = slot;
+        }
         let stands = (sure && better) || better_by_chance(&before, &after).is_some_and(|p| p < BY_CHANCE);
         if replaced || (stands && !on_top) {
             // What stands in the set's place is told.

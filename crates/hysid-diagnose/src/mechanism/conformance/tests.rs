@@ -225,7 +225,6 @@ fn what_is_held_or_wound_beside_a_motion_is_found() {
     assert!(!Structure::of(&induced).slots.iter().any(|s| s.place == Place::Winding && s.has("i")));
 }
 
-/// Heat that follows within a period of the motion is told from there on, in seconds.
 #[test]
 fn what_yields_is_told_within_the_travel_only() {
     let mut seen = 0;
@@ -246,6 +245,7 @@ fn what_yields_is_told_within_the_travel_only() {
     assert!(seen > 0);
 }
 
+/// Heat that follows within a period of the motion is told from there on, in seconds.
 #[test]
 fn the_period_of_the_motion_is_the_least_time_constant_of_heat() {
     let mut seen = 0;
