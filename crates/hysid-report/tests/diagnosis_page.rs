@@ -120,6 +120,27 @@ fn every_verdict_has_its_headline() {
 }
 
 #[test]
+fn what_the_catalogue_does_not_hold_is_told_before_what_comes_nearest() {
+    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
+    let signature =
+        SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "even".into(), side: "plant".into() };
+    let term = |term: &str, slot: &str| TermRecord { term: term.into(), slot: slot.into(), coefficient: 0.1, err: 0.4 };
+    let terms = vec![term("w*b", "state:a"), term("w*a", "state:b")];
+    let correction = CorrectionRecord { slot: "state:a".into(), terms, signature, ratio: Some(0.3) };
+    let of = |verdict: VerdictKind| {
+        let html =
+            page(&DiagnosisFile { correction: Some(correction.clone()), ..file(verdict) }, &picture(), &provenance);
+        let place = |text: &str| html.find(text).unwrap_or_else(|| panic!("the page does not say `{text}`"));
+        assert!(place("w*b") < place("state:b"), "each term has its place");
+        (place("A sparse model"), place("Dry friction of about"), html.contains("probability of coulomb friction"))
+    };
+    let (correction, effect, told) = of(VerdictKind::NotInCatalogue);
+    assert!(correction < effect && !told);
+    let (correction, effect, told) = of(VerdictKind::Named);
+    assert!(effect < correction && told);
+}
+
+#[test]
 fn a_simulation_that_follows_nothing_is_told_so() {
     let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
     let mut lost = picture();

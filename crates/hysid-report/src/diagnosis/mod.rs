@@ -28,7 +28,10 @@ pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) ->
         words::told(&file.summary, file),
     );
     merit(&mut page, file);
-    effects(&mut page, file);
+    // What is missing comes first: of what the catalogue does not hold that is the correction.
+    let (first, last): (Section, Section) =
+        if is_foreign(file) { (correction, effects) } else { (effects, correction) };
+    first(&mut page, file);
     next(&mut page, file, picture);
     fits(&mut page, file);
     page.notes(Tenor::Warning, &file.notes);
@@ -40,7 +43,7 @@ pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) ->
     location(&mut page, file, picture);
     laws(&mut page, picture);
     candidates(&mut page, file);
-    correction(&mut page, file);
+    last(&mut page, file);
     parameters(&mut page, &picture.parameters);
     if file.verdict != VerdictKind::NoSignificantMismatch {
         limits(&mut page, file);
@@ -54,12 +57,20 @@ pub fn page(file: &DiagnosisFile, picture: &Picture, provenance: &Provenance) ->
     page.render()
 }
 
+/// A section of the page.
+type Section = fn(&mut Page, &DiagnosisFile);
+
+/// Whether what is missing is not of the catalogue.
+fn is_foreign(file: &DiagnosisFile) -> bool {
+    file.verdict == VerdictKind::NotInCatalogue
+}
+
 fn merit(page: &mut Page, file: &DiagnosisFile) {
     let mut facts = vec![(
         file.mismatch.p_value.map_or_else(|| "not tested".into(), p_value),
         "p-value: the chance of a mismatch score this large with nothing missing".to_string(),
     )];
-    if let Some(first) = file.effects.first() {
+    if let Some(first) = file.effects.first().filter(|_| !is_foreign(file)) {
         facts.push((probability(first.probability), format!("probability of {}", words::plain(&first.mechanism))));
         facts.push((
             probability(first.family_probability),
@@ -103,9 +114,9 @@ fn effects(page: &mut Page, file: &DiagnosisFile) {
         VerdictKind::Ambiguous => {
             "The likeliest explanation is shown, not all of it firm; what else was weighed is below."
         }
-        _ => "The catalogue's best explanation; it does not explain everything.",
+        _ => "It does not explain what is missing, and stands here so that you see what was tried.",
     };
-    page.section("What is missing", intro);
+    page.section(if is_foreign(file) { "What the catalogue comes nearest with" } else { "What is missing" }, intro);
     for effect in &file.effects {
         page.text(&effect.sentence);
         let mut table = Table::new(&[
@@ -249,7 +260,7 @@ fn correction(page: &mut Page, file: &DiagnosisFile) {
     let Some(correction) = &file.correction else { return };
     let s = &correction.signature;
     page.section(
-        "A correction without a name",
+        if is_foreign(file) { "What is missing: a correction without a name" } else { "A correction without a name" },
         "A sparse model of what no mechanism of the catalogue explains. It improves the prediction; it is not physics.",
     );
     let rate = if s.rate_dependent { "depends on the rate" } else { "does not depend on the rate" };
