@@ -159,7 +159,8 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.notes.extend(one_sided(best));
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
     let rate = file.correction.as_ref().and_then(|c| told_rate(&c.loudest()?.term));
-    let varying = rate.or(varying).or(wanders);
+    // What wanders in the place of an effect is not what a correction that is written describes.
+    let varying = rate.or(varying).or(wanders.filter(|_| modelled.is_none()));
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
     if let Some(refutation) = refutation(&file.fit, &file.effects) {
         file.summary = format!("{} {refutation}", file.summary);
