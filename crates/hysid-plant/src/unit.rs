@@ -79,7 +79,7 @@ const KNOWN: &[(&str, [i32; 5])] = &[
 const COHERENT: [&str; 20] =
     ["m", "kg", "s", "A", "K", "N", "Nm", "Pa", "J", "W", "Hz", "V", "Ohm", "ohm", "S", "H", "F", "C", "Wb", "T"];
 /// What forces and what circuits have is mostly told in.
-const USUAL: [&str; 11] = ["N", "N m", "Pa", "V", "A", "ohm", "m", "m/s", "m/s^2", "N/m", "N s/m"];
+const USUAL: [&str; 12] = ["N", "N m", "Pa", "V", "A", "ohm", "m", "m/s", "m/s^2", "N/m", "N s/m", "1/A^2"];
 const BASES: [&str; 5] = ["m", "kg", "s", "A", "K"];
 const PREFIXES: [&str; 8] = ["n", "u", "m", "c", "d", "k", "M", "G"];
 

@@ -88,6 +88,7 @@ fn units_multiply_and_compare() {
     assert!(unit("N").clashes(&unit("N m")) && unit("psi m").clashes(&unit("psi")));
     assert!(!unit("psi").clashes(&unit("Pa")) && !unit("N").clashes(&unit("kg m/s^2")));
     for (long, brief) in [
+        ("Ohm^2/V^2", "1/A^2"),
         ("N m V/(A ohm)", "N m"),
         ("m^2 Pa", "N"),
         ("kg m/s^2", "N"),
