@@ -95,6 +95,7 @@ both_forms! {
         let n = re.len().min(im.len()).min(cos.len()).min(sin.len());
         let ((re, im), (cos, sin)) = ((&mut re[..n], &mut im[..n]), (&cos[..n], &sin[..n]));
         let (mut sums, whole) = ([[0.0; 8]; 2], n - n % 8);
+        let by = |x: f64, y: f64, cos: f64, sin: f64| (x * cos - y * sin, x * sin + y * cos);
         for (((re, im), cos), sin) in re[..whole]
             .chunks_exact_mut(8)
             .zip(im[..whole].chunks_exact_mut(8))
@@ -102,18 +103,16 @@ both_forms! {
             .zip(sin[..whole].chunks_exact(8))
         {
             for k in 0..8 {
-                let (x, y) = (re[k], im[k]);
-                sums[0][k] += x;
-                sums[1][k] += y;
-                re[k] = x * cos[k] - y * sin[k];
-                im[k] = x * sin[k] + y * cos[k];
+                sums[0][k] += re[k];
+                sums[1][k] += im[k];
+                (re[k], im[k]) = by(re[k], im[k], cos[k], sin[k]);
             }
         }
         let [mut x, mut y] = sums.map(|s| s.iter().sum::<f64>());
         for k in whole..n {
             x += re[k];
             y += im[k];
-            (re[k], im[k]) = (re[k] * cos[k] - im[k] * sin[k], re[k] * sin[k] + im[k] * cos[k]);
+            (re[k], im[k]) = by(re[k], im[k], cos[k], sin[k]);
         }
         (x, y)
     }

@@ -92,6 +92,10 @@ fn picture() -> Picture {
     }
 }
 
+fn provenance() -> Provenance {
+    Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() }
+}
+
 #[test]
 fn every_verdict_has_its_headline() {
     let cases = [
@@ -101,9 +105,8 @@ fn every_verdict_has_its_headline() {
         (VerdictKind::Ambiguous, "cannot tell what"),
         (VerdictKind::NotInCatalogue, "the catalogue does not hold"),
     ];
-    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
     for (verdict, expected) in cases {
-        let html = page(&file(verdict), &picture(), &provenance);
+        let html = page(&file(verdict), &picture(), &provenance());
         for part in [
             expected,
             "Servo &lt;axis&gt;",
@@ -121,7 +124,6 @@ fn every_verdict_has_its_headline() {
 
 #[test]
 fn what_the_catalogue_does_not_hold_is_told_before_what_comes_nearest() {
-    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
     let signature =
         SignatureRecord { memory: "none".into(), rate_dependent: false, symmetry: "even".into(), side: "plant".into() };
     let term = |term: &str, slot: &str| TermRecord { term: term.into(), slot: slot.into(), coefficient: 0.1, err: 0.4 };
@@ -129,7 +131,7 @@ fn what_the_catalogue_does_not_hold_is_told_before_what_comes_nearest() {
     let correction = CorrectionRecord { slot: "state:a".into(), terms, signature, ratio: Some(0.3) };
     let of = |verdict: VerdictKind| {
         let html =
-            page(&DiagnosisFile { correction: Some(correction.clone()), ..file(verdict) }, &picture(), &provenance);
+            page(&DiagnosisFile { correction: Some(correction.clone()), ..file(verdict) }, &picture(), &provenance());
         let place = |text: &str| html.find(text).unwrap_or_else(|| panic!("the page does not say `{text}`"));
         assert!(place("w*b") < place("state:b"), "each term has its place");
         (place("A sparse model"), place("Dry friction of about"), html.contains("probability of coulomb friction"))
@@ -142,18 +144,16 @@ fn what_the_catalogue_does_not_hold_is_told_before_what_comes_nearest() {
 
 #[test]
 fn a_simulation_that_follows_nothing_is_told_so() {
-    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
     let mut lost = picture();
     lost.records[0].role = Role::Estimation;
     lost.records[0].before = vec![0.5; 3];
-    let of = |picture: &Picture| page(&file(VerdictKind::NoSignificantMismatch), picture, &provenance);
+    let of = |picture: &Picture| page(&file(VerdictKind::NoSignificantMismatch), picture, &provenance());
     assert!(of(&lost).contains("does not follow the recording") && of(&lost).contains("Do not keep this simulation"));
     assert!(!of(&picture()).contains("does not follow the recording"));
 }
 
 #[test]
 fn what_the_hold_out_refutes_is_not_recommended() {
-    let provenance = Provenance { command: "hysid diagnose a.sim.toml".into(), version: "0.1.0".into() };
     let of = |ratio: f64| {
         let mut file = file(VerdictKind::Named);
         file.fit.push(FitRecord {
@@ -166,7 +166,7 @@ fn what_the_hold_out_refutes_is_not_recommended() {
             ratio_high: Some(1.1 * ratio),
             rmse_black_box: None,
         });
-        page(&file, &picture(), &provenance)
+        page(&file, &picture(), &provenance())
     };
     let (worse, better) = (of(1.5), of(0.5));
     for part in ["the hold-out does not bear it out", "Do not use augmented.sim.toml"] {

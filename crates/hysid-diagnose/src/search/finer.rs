@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::assemble::{Part, assemble};
 use super::finish::finish;
+use super::fitting::HOPELESS;
 use super::screen::rewrite_at;
 use crate::budget::Step;
 use crate::mechanism::{Form, Law, Purpose, Role};
@@ -28,9 +29,8 @@ const INDIFFERENT: f64 = 0.1;
 const TIE: f64 = 3.0;
 /// Log likelihood by which one that ties must lead to be taken.
 const LESS_LEFT: f64 = 1.0;
-/// Iterations of a fit that tells from which start a form is fitted, and log evidence by which it may trail then and still be fitted to the end.
+/// Iterations of a fit that tells from which start a form is fitted.
 const SKETCH: usize = 3;
-const TRAILING: f64 = 40.0;
 /// Most starts of a form.
 const MOST_STARTS: usize = 4;
 
@@ -125,7 +125,7 @@ fn written_as<'d>(
         assemble(setting, trunk, &values, &parts, &h.base.whitener, SKETCH)
     });
     let best = begun.max_by(|a, b| a.base.log_likelihood.total_cmp(&b.base.log_likelihood));
-    let mut best = best.filter(|b| b.log_evidence > h.log_evidence - TRAILING)?;
+    let mut best = best.filter(|b| b.log_evidence > h.log_evidence - HOPELESS)?;
     if let Some(base) = setting.further(&best.base, Some(&h.base.whitener), 1, setting.iterations) {
         best.base = base;
     }

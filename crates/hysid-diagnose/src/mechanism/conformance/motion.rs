@@ -65,7 +65,7 @@ fn recorded(simulation: &Simulation, period_s: f64, mut inputs: Vec<Vec<f64>>) -
 
 /// A base simulation with an excitation.
 pub struct Bench {
-    pub(super) simulation: Simulation,
+    pub(crate) simulation: Simulation,
     pub(super) drive: Drive,
     structure: Structure,
     signals: Vec<Signals>,
