@@ -15,4 +15,6 @@ pub use columns::{Columns, Gram, Start, map_blocks, sum_over_blocks};
 pub use lstsq::{LinalgError, Lstsq, lstsq, solve_factor};
 pub use matrix::Matrix;
 pub use tall::TallQr;
-pub use vector::{all_finite, axpy, dot, leave_one_out_sum, multiply_by, product, product_of_rows, take_out, turn};
+pub use vector::{
+    Stored, all_finite, axpy, dot, leave_one_out_sum, multiply_by, product, product_of_rows, take_out, turn,
+};

@@ -1,15 +1,20 @@
 //! Plain loops over vectors, compiled for AVX-512 too and chosen at run time; the arithmetic is the same in both forms.
 
+/// What a vector is stored in, in single precision or in double; sums are in double precision.
+pub trait Stored: Copy + Into<f64> {}
+impl Stored for f32 {}
+impl Stored for f64 {}
+
 /// Writes a function in both forms: the loop, compiled for the baseline and for AVX-512.
 macro_rules! both_forms {
-    ($(#[$doc:meta])* pub fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)? $body:block) => {
+    ($(#[$doc:meta])* pub fn $name:ident $(<$of:ident: $bound:ident>)? ($($arg:ident: $type:ty),*) $(-> $out:ty)? $body:block) => {
         $(#[$doc])*
-        pub fn $name($($arg: $type),*) $(-> $out)? {
+        pub fn $name $(<$of: $bound>)? ($($arg: $type),*) $(-> $out)? {
             #[inline(always)]
-            fn plain($($arg: $type),*) $(-> $out)? $body
+            fn plain $(<$of: $bound>)? ($($arg: $type),*) $(-> $out)? $body
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f")]
-            fn wide($($arg: $type),*) $(-> $out)? {
+            fn wide $(<$of: $bound>)? ($($arg: $type),*) $(-> $out)? {
                 plain($($arg),*)
             }
             #[cfg(target_arch = "x86_64")]
@@ -24,14 +29,14 @@ macro_rules! both_forms {
 
 both_forms! {
     /// The inner product of two vectors, in sixteen interleaved partial sums (so that it vectorises and errors grow slowly).
-    pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    pub fn dot<A: Stored>(a: &[A], b: &[f64]) -> f64 {
         let n = a.len().min(b.len());
         let (ca, cb) = (a[..n].chunks_exact(16), b[..n].chunks_exact(16));
-        let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
+        let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(&x, y)| x.into() * y).sum();
         let mut s = [0.0; 16];
         for (x, y) in ca.zip(cb) {
             for k in 0..16 {
-                s[k] += x[k] * y[k];
+                s[k] += x[k].into() * y[k];
             }
         }
         for half in [8, 4, 2, 1] {
@@ -82,9 +87,9 @@ both_forms! {
 
 both_forms! {
     /// y += a x.
-    pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
-        for (y, x) in y.iter_mut().zip(x) {
-            *y += a * x;
+    pub fn axpy<A: Stored>(a: f64, x: &[A], y: &mut [f64]) {
+        for (y, &x) in y.iter_mut().zip(x) {
+            *y += a * x.into();
         }
     }
 }
@@ -169,6 +174,12 @@ mod tests {
             let b = vec![2.0; n];
             let expected: f64 = a.iter().sum::<f64>() * 2.0;
             assert_eq!(dot(&a, &b), expected, "{n}");
+            let singly: Vec<f32> = (0..n).map(|i| i as f32).collect();
+            assert_eq!(dot(&singly, &b), expected, "{n}");
+            let (mut y, mut from_single) = (b.clone(), b.clone());
+            axpy(-0.3, &a, &mut y);
+            axpy(-0.3, &singly, &mut from_single);
+            assert_eq!(y, from_single, "{n}");
             let squares: f64 = a.iter().map(|x| x * x / 4.0).sum();
             approx::assert_relative_eq!(leave_one_out_sum(&a, &b, 1e-9), squares, max_relative = 1e-14);
         }

@@ -15,7 +15,7 @@ use crate::model::base::{Base, Interval};
 use crate::model::hold::FreeRun;
 use crate::model::hypothesis::{Effect, Hypothesis};
 use crate::request::{Question, words};
-use crate::search::screen::Candidate;
+use crate::search::candidate::Candidate;
 use crate::text::number;
 use crate::verdict::Support;
 use crate::verdict::weigh::Contest;

@@ -27,7 +27,7 @@ pub use blocks::{better_by_chance, difference};
 pub use constancy::{Wander, lines};
 pub use layout::{Layout, Series, Whitener};
 pub use noise::NoiseModel;
-pub use projector::{Projector, norm2};
+pub use projector::{Projector, doubly, norm2};
 pub use quantile::quantile;
 pub use response::ForcePath;
 pub use score::{FeatureGroup, INSIDE, detectable_amplitude, score, surprise};

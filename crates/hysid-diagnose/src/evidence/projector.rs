@@ -1,6 +1,6 @@
 //! The projector onto the complement of what the simulation's own parameters and initial states can do.
 
-use hysid_linalg::{axpy, dot};
+use hysid_linalg::{Stored, axpy, dot};
 
 /// Squared Euclidean norm.
 pub fn norm2(a: &[f64]) -> f64 {
@@ -8,10 +8,15 @@ pub fn norm2(a: &[f64]) -> f64 {
 }
 
 /// Takes the part along orthonormal columns out of `x`.
-pub fn remove_along(columns: &[Vec<f64>], x: &mut [f64]) {
+pub fn remove_along<A: Stored>(columns: &[Vec<A>], x: &mut [f64]) {
     for q in columns {
         axpy(-dot(q, x), q, x);
     }
+}
+
+/// A column in double precision again.
+pub fn doubly(column: &[f32]) -> Vec<f64> {
+    column.iter().map(|&x| x.into()).collect()
 }
 
 /// An orthonormal basis and the projection off it.
@@ -82,6 +87,11 @@ impl Projector {
     /// The orthonormal basis.
     pub fn basis(&self) -> &[Vec<f64>] {
         &self.basis
+    }
+
+    /// The orthonormal basis in single precision.
+    pub fn singly(self) -> Vec<Vec<f32>> {
+        self.basis.into_iter().map(|q| q.into_iter().map(|x| x as f32).collect()).collect()
     }
 
     /// Projects in place.

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::candidate::Candidate;
 use super::finish::{finish, likelier};
-use super::screen::{Candidate, rewrite_at, with_added_starts};
+use super::screen::{rewrite_at, with_added_starts};
 use super::starts::{set, starts, weakened};
 use crate::evidence::Whitener;
 use crate::mechanism::{Mechanism, Purpose};

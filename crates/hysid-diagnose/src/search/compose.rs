@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::assemble::{Part, assemble, complete, without};
+use super::candidate::{Candidate, Columns};
 use super::finer::{finer, inherited};
 use super::fitting::{HOPELESS, refit_all, refit_beside};
-use super::joint::pairs;
+use super::joint::{fitted_pairs, likeliest_pairs, superposed};
 use super::looks::{Looks, Seen};
 use super::parted::parted;
 use super::rivals::{include, rivals_of, short_list};
-use super::screen::Candidate;
 use super::simpler::simplify;
 use crate::budget::Step;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
@@ -32,7 +32,7 @@ pub struct Ask<'a, 'd> {
     /// Whether something significant is left of a hypothesis' residual.
     pub unexplained: &'a dyn Fn(&Hypothesis<'d>) -> bool,
     /// What could be missing around a hypothesis.
-    pub around: &'a (dyn Fn(&Hypothesis<'d>) -> Vec<Candidate> + Sync),
+    pub around: &'a (dyn Fn(&Hypothesis<'d>, Columns) -> Vec<Candidate> + Sync),
     /// Effects that its noise model may have taken for noise.
     pub absorbed: &'a (dyn Fn(&Hypothesis<'d>) -> Vec<Candidate> + Sync),
     /// The hypothesis under white noise, with what could be missing around it there; `None` where its noise is white.
@@ -46,8 +46,6 @@ pub struct Ask<'a, 'd> {
 /// Log evidence that another effect must add.
 pub const LEAST_GAIN: f64 = 4.0;
 
-/// Pairs of the evidence space that are tried by simulation, and those of them that are fitted to the end.
-const PAIRS: (usize, usize) = (10, 4);
 /// Most rounds of drops and swaps: one may bring another best set, whose members have other rivals.
 const ROUNDS: usize = 4;
 
@@ -56,37 +54,6 @@ const FAR_BEHIND: f64 = 100.0;
 
 /// Log evidence by which the second best set may trail and still have its members' rivals heard.
 const NEARLY: f64 = 6.0;
-
-/// A hypothesis with pairs of what could be missing around it, each fitted together.
-pub fn superposed<'d>(
-    setting: &Setting<'d>,
-    parent: &Hypothesis<'d>,
-    candidates: &[Candidate],
-    most: usize,
-) -> Vec<Hypothesis<'d>> {
-    if setting.budget.omits(Step::Fits) {
-        return Vec::new();
-    }
-    let (_, r) = parent.base.evidence();
-    let own = parent.base.values();
-    let mut sketched: Vec<Hypothesis<'d>> = pairs(candidates, &r, PAIRS.0)
-        .par_iter()
-        .filter_map(|pair| {
-            if setting.budget.omits(Step::Fits) {
-                return None;
-            }
-            let parts =
-                [0, 1].map(|i| Part::of_candidate(&candidates[pair.members[i]], pair.points[i], &pair.amplitudes[i]));
-            assemble(setting, parent, &own, &parts, &parent.base.whitener, 5)
-        })
-        .collect();
-    sketched.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
-    let rest = sketched.split_off(PAIRS.1.min(sketched.len()).min(most));
-    let to_the_end = |h| if setting.budget.omits(Step::Fits) { h } else { complete(setting, h) };
-    let mut out: Vec<Hypothesis<'d>> = sketched.into_par_iter().map(to_the_end).collect();
-    out.extend(rest);
-    out
-}
 
 /// Candidates that are fitted where the test sees nothing more, and the score from which on they are.
 const UNSEEN: (usize, f64) = (3, 16.0);
@@ -104,11 +71,11 @@ fn unseen<'d>(setting: &Setting<'d>, parent: &Hypothesis<'d>, candidates: &[Cand
 
 /// Extends the hypotheses of `pool` (all of one effect or more) until evidence stops growing, prunes the best and tries swaps.
 ///
-/// `candidates` are those of the simulation without effects. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
+/// `candidates` are those of the simulation without effects; their columns are dropped once its likeliest pairs are known. All hypotheses that were fitted stay in the pool: the verdict's probabilities are over them.
 pub fn compose<'d>(
     setting: &Setting<'d>,
     none: &Hypothesis<'d>,
-    candidates: &[Candidate],
+    candidates: &mut [Candidate],
     pool: &mut Vec<Hypothesis<'d>>,
     options: SearchOptions,
     ask: &Ask<'_, 'd>,
@@ -116,6 +83,10 @@ pub fn compose<'d>(
     let Ask { unexplained, around, absorbed, .. } = ask;
     let enough = || setting.budget.omits(Step::Composition);
     let mut looks = Looks::default();
+    let likeliest =
+        if ask.paired || options.first > 2 || enough() { Vec::new() } else { likeliest_pairs(none, candidates) };
+    // A long recording's are hundreds of megabytes, and those around a set of effects are as many.
+    candidates.iter_mut().for_each(Candidate::drop_columns);
     for depth in options.first..=options.depth {
         if enough() {
             return;
@@ -126,11 +97,11 @@ pub fn compose<'d>(
         let best = pool[standing].log_evidence;
         let parents = beam(pool, depth - 1, options.beam);
         let mut found = if depth == 2 { parted(setting, none, pool, candidates) } else { Vec::new() };
-        if more && depth == 2 && !ask.paired {
-            found.extend(superposed(setting, none, candidates, options.most));
+        if more && depth == 2 {
+            found.extend(fitted_pairs(setting, none, candidates, &likeliest, options.most));
         }
         if !more {
-            found.extend(unseen(setting, &pool[standing], &around(&pool[standing])));
+            found.extend(unseen(setting, &pool[standing], &around(&pool[standing], Columns::Dropped)));
         }
         let beside = |&p: &usize| {
             let mut seen = Seen::default();
@@ -139,7 +110,7 @@ pub fn compose<'d>(
             }
             let parent = &pool[p];
             if more {
-                let candidates = around(parent);
+                let candidates = around(parent, Columns::Dropped);
                 let list = worth_adding(&candidates, options.most, None);
                 seen.found.extend(refit_all(setting, parent, &list));
                 seen.fitted.extend(list.iter().map(|c| c.key()));
@@ -192,7 +163,7 @@ pub fn compose<'d>(
                 return Seen::default();
             }
             let known = looks.around(rest);
-            let fresh = known.is_none().then(|| around(rest));
+            let fresh = known.is_none().then(|| around(rest, Columns::Dropped));
             let candidates = known.map_or(fresh.as_deref().unwrap_or_default(), |look| &look.candidates);
             let mut found = swapped(setting, none, set, *index, candidates);
             let mut list = worth_adding(candidates, options.most, Some(&set.effects[*index]));
@@ -234,7 +205,7 @@ fn two_at_once<'d>(
     options: SearchOptions,
     ask: &Ask<'_, 'd>,
 ) -> Vec<Hypothesis<'d>> {
-    let mut found = superposed(setting, stands, &(ask.around)(stands), options.most);
+    let mut found = superposed(setting, stands, &(ask.around)(stands, Columns::Kept), options.most);
     if let Some((plain, candidates)) = (ask.plainly)(stands) {
         found.extend(superposed(setting, &plain, &candidates, options.most));
     }
@@ -262,7 +233,7 @@ fn beside_the_second<'d>(
             return Vec::new();
         }
         let Some(rest) = without(setting, none, set, index) else { return Vec::new() };
-        let mut found = swapped(setting, none, set, index, &(ask.around)(&rest));
+        let mut found = swapped(setting, none, set, index, &(ask.around)(&rest, Columns::Dropped));
         found.push(rest);
         found
     };

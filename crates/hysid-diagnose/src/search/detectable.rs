@@ -1,6 +1,6 @@
 //! The least effects that a recording would have shown.
 
-use super::screen::Candidate;
+use super::candidate::Candidate;
 use crate::evidence::{FeatureGroup, detectable_amplitude};
 use crate::file::DetectableRecord;
 

@@ -2,14 +2,15 @@
 
 use rayon::prelude::*;
 
+use super::Search;
+use super::candidate::{Candidate, Columns};
 use super::compose::{add, best_of};
 use super::detectable::detectability;
 use super::finer::finer;
+use super::given_up::leaves_more;
 use super::prediction::parts;
 use super::rounding::rounded;
-use super::screen::Candidate;
 use super::tracked;
-use super::{Search, leaves_more};
 use crate::budget::Step;
 use crate::calibration::fair::recalibrated;
 use crate::calibration::lesson::{Done, Lesson, lesson};
@@ -156,7 +157,7 @@ fn attempt<'a, 'd>(
 
     (hooks.progress)("looking for what could be missing");
     let evidence = none.base.evidence();
-    let mut candidates = setting.lacking(&none, &evidence);
+    let mut candidates = setting.lacking(&none, &evidence, Columns::Kept);
     let residual = setting.data.layout.rms(&none.base.fit.residual);
     let detectable = detectability(&candidates);
     let search = Search::new(setting.clone(), options, hooks);
@@ -222,12 +223,12 @@ fn attempt<'a, 'd>(
     // Plain squares take what a random force does for mismatch, also where the simulation is linear.
     let mut forced = None;
     let mut set_aside = None;
-    if significant && let Some((start, found)) = gross.take() {
+    if significant && let Some((start, mut found)) = gross.take() {
         plainly.singles(&start, &found, &mut pool, &glanced);
         if let Some(lesson) = learned(&plainly, &start, &pool, Done::Singles) {
             return Err(Box::new(lesson));
         }
-        plainly.combine(&start, &found, &mut pool, !glanced.is_empty(), 0);
+        plainly.combine(&start, &mut found, &mut pool, !glanced.is_empty(), 0);
         glanced.clear();
         let sets = search.under_noise(&none, &pool);
         let fine = best_of(&sets).is_some_and(|b| !sets[b].effects.is_empty() && !sets[b].base.gross());
@@ -249,7 +250,7 @@ fn attempt<'a, 'd>(
         // Where a random force explains what the likeliest single effects do, sets of them would take it bit by bit.
         forced = search.by_a_force_alone(&none, &pool, candidates.len());
         if forced.is_none() && !search.is_read(&pool) {
-            search.combine(&none, &candidates, &mut pool, !glanced.is_empty(), settled);
+            search.combine(&none, &mut candidates, &mut pool, !glanced.is_empty(), settled);
         }
         // A noise model under which the best set explains nothing has taken the mismatch for noise: plain squares decide after all.
         if let Some((start, found, sets)) = set_aside

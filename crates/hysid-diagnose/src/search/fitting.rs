@@ -5,9 +5,10 @@
 
 use rayon::prelude::*;
 
+use super::candidate::Candidate;
 use super::finer::finer;
 use super::finish::{finish, likelier};
-use super::screen::{Candidate, with_added_starts};
+use super::screen::with_added_starts;
 use super::starts::{is_in_a_loop, set, starting_values, starts, strength_in_shapes};
 use crate::budget::Step;
 use crate::evidence::Whitener;
@@ -316,6 +317,7 @@ mod tests {
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond};
+    use crate::search::candidate::Columns;
 
     #[test]
     fn a_law_with_several_shapes_is_left_only_where_it_explains_nothing() {
@@ -325,7 +327,7 @@ mod tests {
         let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
         let budget = Budget::new(&|_| false);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
-        let candidates = setting.lacking(&none, &none.base.evidence());
+        let candidates = setting.lacking(&none, &none.base.evidence(), Columns::Kept);
         let with = |bent: bool| candidates.iter().find(|c| (c.refit.shapes.len() >= BENT) == bent).unwrap();
         let one = |bent: bool, gain: f64| {
             let base = setting.further(&none.base, None, 1, 1).unwrap();

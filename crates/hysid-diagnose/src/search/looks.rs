@@ -1,7 +1,7 @@
 //! What was seen around sets of effects. Backward search comes back to sets that were extended before: what could be missing around them is known, and what
 //! was fitted beside them need not be fitted again.
 
-use super::screen::Candidate;
+use super::candidate::Candidate;
 use crate::model::hypothesis::{Hypothesis, Key};
 
 /// Log evidence within which two fits of one statement are the same fit.
@@ -11,7 +11,7 @@ const SAME: f64 = 0.15;
 pub struct Look {
     set: Key,
     log_evidence: f64,
-    /// What could be missing, best score first, without the columns that only pairs and tests need.
+    /// What could be missing, best score first.
     pub candidates: Vec<Candidate>,
     /// What was fitted beside the set.
     pub fitted: Vec<Key>,
@@ -50,7 +50,6 @@ impl Looks {
         match (self.0.iter_mut().find(|look| look.is_of(h)), fresh) {
             (Some(known), _) => known.fitted.extend(fitted),
             (None, Some(candidates)) => {
-                let candidates = candidates.into_iter().map(Candidate::bare).collect();
                 self.0.push(Look { set: h.key(), log_evidence: h.log_evidence, candidates, fitted });
             }
             (None, None) => {}

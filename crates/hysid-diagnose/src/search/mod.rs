@@ -5,6 +5,7 @@
 //! the fitted set and the setting of its fits (`hypothesis`), and the time (`budget`).
 
 pub mod assemble;
+pub mod candidate;
 pub mod compose;
 pub mod detectable;
 pub mod explore;
@@ -12,6 +13,7 @@ pub mod finer;
 pub mod finish;
 pub mod fitting;
 pub mod gentle;
+pub mod given_up;
 pub mod joint;
 pub mod looks;
 pub mod numerics_check;
@@ -36,17 +38,21 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use rayon::prelude::*;
 
 use crate::budget::Step;
-use crate::evidence::{Contender, FeatureGroup, NoiseModel, Projector, SurrogateTest, TestOptions, surrogate_test};
+use crate::evidence::{
+    Contender, FeatureGroup, NoiseModel, Projector, SurrogateTest, TestOptions, doubly, surrogate_test,
+};
 use crate::mechanism::{Family, Mechanism, SLOW};
 use crate::model::base::{Base, NoiseKind};
 use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::openset::{ODDS_AGAINST_MORE, OpenSet, correction};
 use crate::request::{Hooks, Options, Question};
 use crate::slot::Slot;
+use candidate::{Candidate, Columns};
 use compose::{Ask, SearchOptions, add, compose};
 use fitting::{refit, refit_all, refit_wider};
+use given_up::keep_explaining;
 use rivals::{include, outdone_by_a_special_case, short_list, unheard};
-use screen::{Candidate, screen};
+use screen::screen;
 use starts::is_in_a_loop;
 
 /// Composition goes on while the mismatch that remains is significant at this level.
@@ -63,37 +69,6 @@ const STOP_SCORE: f64 = 25.0;
 const HEARINGS: usize = 2;
 /// Candidates that are refitted alone.
 const SHORT_LIST: usize = 10;
-
-/// Plain error, over that of a set of no more effects, at which a set under a noise model takes mismatch for noise.
-const GIVEN_UP: f64 = 1.5;
-
-/// Whether a set leaves a larger plain error than the simulation without effects: its noise model explains, and the effects do not.
-pub fn leaves_more(h: &Hypothesis<'_>, none: &Hypothesis<'_>) -> bool {
-    plain_error(h, none).1 > plain_error(none, none).1
-}
-
-/// The number of effects of a set, and the plain error that it leaves, each output in units of what the simulation without effects leaves of it.
-fn plain_error(h: &Hypothesis<'_>, none: &Hypothesis<'_>) -> (usize, f64) {
-    let layout = &h.base.model.data().layout;
-    let (left, before) = (layout.rms(&h.base.fit.residual), layout.rms(&none.base.fit.residual));
-    let error = left.iter().zip(&before).map(|(l, b)| (l / b.max(f64::MIN_POSITIVE)).powi(2)).sum::<f64>().sqrt();
-    (h.effects.len(), error)
-}
-
-/// Whether a set of so many effects that leaves this error leaves much more than one of these of no more effects.
-fn outdone((effects, error): (usize, f64), others: &[(usize, f64)]) -> bool {
-    others.iter().any(|&(of, left)| of <= effects && error > GIVEN_UP * left)
-}
-
-/// Drops the sets that call noise what others explain, where the simulation is so far off that most of the residual is no noise. A colour can
-/// be found for any residual, and the likelihood of a slow one under its own colour is high.
-fn keep_explaining<'d>(none: &Hypothesis<'d>, pool: &mut Vec<Hypothesis<'d>>) {
-    if none.base.far() {
-        let errors: Vec<_> = pool.iter().map(|h| plain_error(h, none)).collect();
-        let mut all = errors.iter();
-        pool.retain(|_| all.next().is_none_or(|own| !outdone(*own, &errors)));
-    }
-}
 
 /// A search for sets of effects on one calibrated simulation.
 pub struct Search<'a, 'd> {
@@ -122,7 +97,7 @@ impl<'a, 'd> Search<'a, 'd> {
     pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
         let base = self.setting.further(&none.base, None, 2, 25)?;
         let start = self.setting.hypothesis(Vec::new(), base);
-        let candidates = self.setting.lacking(&start, &start.base.evidence());
+        let candidates = self.setting.lacking(&start, &start.base.evidence(), Columns::Kept);
         Some((start, candidates))
     }
 
@@ -178,7 +153,7 @@ impl<'a, 'd> Search<'a, 'd> {
     pub fn combine(
         &self,
         none: &Hypothesis<'d>,
-        candidates: &[Candidate],
+        candidates: &mut [Candidate],
         pool: &mut Vec<Hypothesis<'d>>,
         paired: bool,
         settled: usize,
@@ -190,14 +165,15 @@ impl<'a, 'd> Search<'a, 'd> {
             seen || self.open(h).is_some_and(|o| o.by_chance(ODDS_AGAINST_MORE) < self.options.alpha)
         };
         let bounds = SearchOptions { first: settled.max(1) + 1, depth: 3, beam: 2, most: 6 };
-        let around = |h: &Hypothesis<'d>| self.around(h);
+        let count = candidates.len();
+        let around = |h: &Hypothesis<'d>, columns| self.around(h, columns);
         let absorbed = |h: &Hypothesis<'d>| self.absorbed(h);
         let plainly = |h: &Hypothesis<'d>| {
             let h = self.plainly(h)?;
-            let found = around(&h);
+            let found = around(&h, Columns::Kept);
             Some((h, found))
         };
-        let pushed = |h: &Hypothesis<'d>, sets: &[Hypothesis<'d>]| self.is_pushed_rather(h, sets, candidates.len());
+        let pushed = |h: &Hypothesis<'d>, sets: &[Hypothesis<'d>]| self.is_pushed_rather(h, sets, count);
         let hear = Ask {
             unexplained: &unexplained,
             around: &around,
@@ -264,7 +240,7 @@ impl<'a, 'd> Search<'a, 'd> {
             return SurrogateTest::of_nothing();
         }
         let evidence = h.base.evidence();
-        let rest = self.setting.lacking(h, &evidence);
+        let rest = self.setting.lacking(h, &evidence, Columns::Kept);
         let test = self.test(&rest, &h.base, &evidence);
         held(&self.tests).insert(key.clone(), test.clone());
         *held(&self.screened) = Some((key, rest));
@@ -272,9 +248,13 @@ impl<'a, 'd> Search<'a, 'd> {
     }
 
     /// What could be missing around a hypothesis.
-    fn around(&self, h: &Hypothesis<'_>) -> Vec<Candidate> {
+    fn around(&self, h: &Hypothesis<'_>, columns: Columns) -> Vec<Candidate> {
         let known = held(&self.screened).take_if(|(key, _)| *key == fitted_key(h));
-        let mut found = known.map_or_else(|| self.setting.lacking(h, &h.base.evidence()), |(_, candidates)| candidates);
+        let looked_for = || self.setting.lacking(h, &h.base.evidence(), columns);
+        let mut found = known.map_or_else(looked_for, |(_, candidates)| candidates);
+        if columns == Columns::Dropped {
+            found.iter_mut().for_each(Candidate::drop_columns);
+        }
         tracked::include(&mut found, tracked::along_the_recording(&self.setting, h));
         found
     }
@@ -313,7 +293,7 @@ impl<'a, 'd> Search<'a, 'd> {
         let may_be_noise = !(base.coloured() || base.gross() || base.far());
         let options = TestOptions { alpha: self.options.alpha, seed: self.options.seed, may_be_noise };
         if !base.whitener.models.iter().all(NoiseModel::is_known_below) {
-            let drifts = Projector::new(groups_of(true).flat_map(|g| g.columns.iter().cloned()));
+            let drifts = Projector::new(groups_of(true).flat_map(|g| g.columns.iter().map(|c| doubly(c))));
             let rest: Vec<FeatureGroup> = groups_of(false).filter_map(|g| g.outside(&drifts)).collect();
             let groups: Vec<Contender<'_>> = rest.iter().map(|group| Contender { group, handicap: 0.0 }).collect();
             let (mut own, mut r) = (own.clone(), r.clone());
@@ -367,7 +347,11 @@ mod tests {
         let (setting, none) = calibrated(original, &data, NoiseKind::Coloured, &budget);
         let search = Search::new(setting, Options::default(), &Hooks::SILENT);
         let found: Vec<&str> = search.absorbed(&none).iter().map(|c| c.mechanism.id).collect();
-        let own = search.around(&none).iter().find(|c| found.first() == Some(&c.mechanism.id)).map(Candidate::score);
+        let own = search
+            .around(&none, Columns::Dropped)
+            .iter()
+            .find(|c| found.first() == Some(&c.mechanism.id))
+            .map(Candidate::score);
         (found, own)
     }
 
@@ -379,19 +363,5 @@ mod tests {
         assert!(line.first() == Some(&"periodic_disturbance") && own.unwrap() < 0.0, "{line:?} {own:?}");
         let (slow, own) = absorbed(|t| 1.0 + 0.5 * (0.2 * t).sin());
         assert!(slow.iter().any(|m| m.ends_with("_offset")) && own.unwrap() < STOP_SCORE, "{slow:?} {own:?}");
-    }
-
-    #[test]
-    fn a_set_that_leaves_what_a_smaller_one_explains_has_given_up() {
-        let check = |own, others: &[(usize, f64)], expected| {
-            assert_eq!(outdone(own, others), expected, "{own:?} beside {others:?}")
-        };
-        // A damper: one effect under plain squares, three under a coloured noise.
-        check((3, 0.66), &[(1, 0.22), (3, 0.66)], true);
-        check((1, 0.22), &[(1, 0.22), (3, 0.66)], false);
-        // More effects may leave less.
-        check((1, 0.66), &[(2, 0.22)], false);
-        check((2, 0.30), &[(1, 0.22)], false);
-        check((2, 0.30), &[], false);
     }
 }

@@ -226,8 +226,9 @@ mod tests {
     use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
+    use crate::search::candidate::Candidate;
     use crate::search::fitting::refit;
-    use crate::search::screen::{Candidate, screen};
+    use crate::search::screen::screen;
     use crate::slot::Slot;
     use hysid_plant::Simulation;
 

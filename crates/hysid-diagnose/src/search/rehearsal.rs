@@ -12,8 +12,9 @@
 use rand::RngExt;
 use rayon::prelude::*;
 
+use super::candidate::{Candidate, Point};
 use super::peaks::lines_of;
-use super::screen::{Candidate, Point, with_added_starts};
+use super::screen::with_added_starts;
 use super::starts::set;
 use crate::budget::Step;
 use crate::data::DataSet;

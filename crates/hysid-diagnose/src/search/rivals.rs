@@ -1,8 +1,8 @@
 //! Who is heard: the candidates that are worth a fit, and what is easily taken for an effect that was fitted.
 
+use super::candidate::Candidate;
 use super::compose::best_of_size;
 use super::fitting::HOPELESS;
-use super::screen::Candidate;
 use crate::mechanism::Mechanism;
 use crate::model::hypothesis::{Effect, Hypothesis, Key};
 

@@ -9,9 +9,10 @@
 use rayon::prelude::*;
 
 use super::Search;
+use super::candidate::{Candidate, Columns};
 use super::compose::{add, best_of};
 use super::fitting::refit;
-use super::screen::{Candidate, screen};
+use super::screen::{Along, screen, screen_along};
 use crate::budget::Step;
 use crate::data::steps::OFF_A_STEP;
 use crate::evidence::Projector;
@@ -74,9 +75,9 @@ pub fn rounded(setting: &Setting<'_>, none: &Base<'_>) -> Vec<String> {
 impl Setting<'_> {
     /// What could be missing around a hypothesis. The rounding of fine converters is noise to the search: the step of one that rounds no noise outweighs all
     /// physics, and beside it nothing is found in time.
-    pub fn lacking(&self, h: &Hypothesis<'_>, evidence: &(Projector, Vec<f64>)) -> Vec<Candidate> {
+    pub fn lacking(&self, h: &Hypothesis<'_>, evidence: &(Projector, Vec<f64>), held: Columns) -> Vec<Candidate> {
         let sought = |m: &Mechanism, s: &Slot| m.id != ROUNDING || !self.rounded.contains(&s.label);
-        screen(&h.base, &self.original, &h.effects, evidence, &sought)
+        screen_along(&h.base, Along::itself(&h.base), &self.original, &h.effects, evidence, &sought, held)
     }
 }
 

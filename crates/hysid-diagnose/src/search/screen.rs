@@ -8,12 +8,13 @@ use std::collections::BTreeMap;
 use hysid_plant::{Expr, Simulation};
 use rayon::prelude::*;
 
+use super::candidate::{Candidate, Columns, Point};
 use super::peaks::residual_peaks;
 use super::ripple::residual_periods;
 use crate::evidence::{FeatureGroup, Projector, norm2, score};
 use crate::mechanism::{Family, Mechanism, Purpose, Rewritten, Signals, catalogue};
 use crate::model::base::Base;
-use crate::model::hypothesis::{Effect, Key};
+use crate::model::hypothesis::Effect;
 use crate::model::{Model, Values, along};
 use crate::slot::{Slot, Structure, only_parameters};
 
@@ -32,70 +33,6 @@ fn kept(rows: usize) -> usize {
 
 /// Points of a shape grid that are simulated together.
 const TOGETHER: usize = 8;
-
-/// One joint point of a candidate's shape grids.
-#[derive(Debug, Clone)]
-pub struct Point {
-    /// The shapes.
-    pub shapes: Vec<(String, f64)>,
-    /// Its columns in the evidence space; kept for a spread of points ([`kept`] at most), chosen without looking at the residual.
-    pub group: Option<FeatureGroup>,
-    /// Its columns, kept for the best points: pairs of candidates are judged by these and by those of `group`.
-    pub joint: Option<FeatureGroup>,
-    /// Share of its response that the simulation's own parameters absorb.
-    pub concealment: f64,
-    /// Norm of its first amplitude's response outside the tangent space.
-    pub norm: f64,
-    /// The amplitudes that explain the residual best, by name.
-    pub amplitudes: Vec<(String, f64)>,
-    /// Its score.
-    pub score: f64,
-}
-
-/// A mechanism at a slot.
-#[derive(Debug, Clone)]
-pub struct Candidate {
-    /// The mechanism.
-    pub mechanism: &'static Mechanism,
-    /// The slot.
-    pub slot: Slot,
-    /// The simulation with it, in physical parameters.
-    pub refit: Rewritten,
-    /// The points of its shape grid, best score first.
-    pub points: Vec<Point>,
-    /// What the recording lacks for it to be seen.
-    pub lacking: Option<String>,
-}
-
-impl Candidate {
-    /// The statement that it makes alone.
-    pub fn key(&self) -> Key {
-        vec![(self.mechanism.id, self.slot.identity())]
-    }
-
-    /// Whether the recording shows by itself that something of this kind is there.
-    pub fn is_shown(&self) -> bool {
-        self.lacking.is_none() && self.mechanism.needs.iter().any(|n| n.is_telling())
-    }
-
-    /// Its largest score.
-    pub fn score(&self) -> f64 {
-        self.points.first().map_or(f64::NEG_INFINITY, |p| p.score)
-    }
-
-    /// The same without the columns of its points, which take most of the memory.
-    pub fn bare(mut self) -> Self {
-        for point in &mut self.points {
-            (point.group, point.joint) = (None, None);
-        }
-        self
-    }
-
-    /// Share of its response that the simulation's own parameters absorb, at its best point.
-    pub fn concealment(&self) -> Option<f64> {
-        self.points.first().map(|p| p.concealment)
-    }
-}
 
 /// What is known of the signals at each slot; `periods` and `read` ([`crate::data::DataSet::read_in_steps`]) matter to ripples only.
 fn signals(
@@ -172,7 +109,7 @@ pub fn screen(
     evidence: &(Projector, Vec<f64>),
     keep: &dyn Fn(&Mechanism, &Slot) -> bool,
 ) -> Vec<Candidate> {
-    screen_along(base, Along { motion: base, bring: &|_| {} }, original, effects, evidence, keep)
+    screen_along(base, Along::itself(base), original, effects, evidence, keep, Columns::Kept)
 }
 
 /// The motion along which features are taken: that of the simulation as it runs, or another.
@@ -184,7 +121,14 @@ pub struct Along<'a> {
     pub bring: &'a (dyn Fn(&mut Simulation) + Sync),
 }
 
-/// The same with the features, and the evidence, along another motion.
+impl<'a> Along<'a> {
+    /// The motion of the simulation as it runs.
+    pub fn itself(base: &'a Base<'a>) -> Self {
+        Self { motion: base, bring: &|_| {} }
+    }
+}
+
+/// The same with the features, and the evidence, along a motion, and with columns or without.
 pub fn screen_along(
     base: &Base<'_>,
     along: Along<'_>,
@@ -192,6 +136,7 @@ pub fn screen_along(
     effects: &[Effect],
     evidence: &(Projector, Vec<f64>),
     keep: &dyn Fn(&Mechanism, &Slot) -> bool,
+    held: Columns,
 ) -> Vec<Candidate> {
     let (own, r) = evidence;
     let document = base.document();
@@ -227,7 +172,12 @@ pub fn screen_along(
             let best = points.first()?;
             let purpose = mechanism.fitted_first(slot, &best.amplitudes, &best.shapes);
             let refit = mechanism.rewrite(&document, slot, signals, purpose).ok()?;
-            Some(Candidate { mechanism, slot: (*slot).clone(), refit, points, lacking: mechanism.lacking(signals) })
+            let slot = (*slot).clone();
+            let mut found = Candidate { mechanism, slot, refit, points, lacking: mechanism.lacking(signals) };
+            if held == Columns::Dropped {
+                found.drop_columns();
+            }
+            Some(found)
         })
         .collect();
     found.sort_by(|a, b| b.score().total_cmp(&a.score()));

@@ -5,12 +5,12 @@
 //! own, is free of all three: what it gains is compared with what the number of sets that were looked at would gain by chance.
 
 use super::Search;
-use super::compose::superposed;
+use super::candidate::Candidate;
 use super::fitting::refit_all;
+use super::joint::superposed;
 use super::peaks::lines_of;
 use super::rehearsal::by_rehearsal;
 use super::rivals::short_list;
-use super::screen::Candidate;
 use crate::evidence::{NoiseModel, better_by_chance, difference};
 use crate::mechanism::SLOW;
 use crate::model::base::spared;

@@ -2,7 +2,8 @@
 
 use hysid_plant::Simulation;
 
-use super::screen::{Candidate, Point, with_added_starts};
+use super::candidate::{Candidate, Point};
+use super::screen::with_added_starts;
 use crate::budget::Step;
 use crate::calibration::global::calibrated_copy;
 use crate::calibration::unfold::calibrated_unfolded;

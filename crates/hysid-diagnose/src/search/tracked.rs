@@ -11,7 +11,8 @@
 
 use hysid_plant::{Expr, Hold, Input, Simulation};
 
-use super::screen::{Along, Candidate, screen_along};
+use super::candidate::{Candidate, Columns};
+use super::screen::{Along, screen_along};
 use crate::data::{DataSet, Stretch};
 use crate::mechanism::Mechanism;
 use crate::model::Model;
@@ -47,8 +48,8 @@ pub fn along_the_recording(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Can
     let along = Along { motion: &motion, bring: &bring };
     // What a sensor does to a motion is seen in the noise that the observer follows.
     let moves = |_: &Mechanism, slot: &Slot| matches!(slot.target, Target::Derivatives(_));
-    let found = screen_along(base, along, &setting.original, &h.effects, &motion.evidence(), &moves);
-    found.into_iter().take_while(|c| c.score() > SCORE).take(MOST).map(Candidate::bare).collect()
+    let found = screen_along(base, along, &setting.original, &h.effects, &motion.evidence(), &moves, Columns::Dropped);
+    found.into_iter().take_while(|c| c.score() > SCORE).take(MOST).collect()
 }
 
 /// Puts what was found along the recorded motion among the candidates: what is there already is fitted from there first.

@@ -91,7 +91,8 @@ impl Finder<'_> {
         rate.symbols().iter().any(|s| open(s) && !mass.is_some_and(|mass| mass.uses(s)))
     }
 
-    /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too: `0.001` of a road in mm.
+    /// What a spring whose rate is estimated compares a displacement with for each unit of an input that is one too, by what is known: `0.001` of a road in mm,
+    /// `pi/180` of a rod in degrees, the radius of a pinion.
     fn travel(&self, one: &Motion<'_>, x: &str, input: &str) -> Option<Expr> {
         // The rate of an acceleration balances no forces: what stands there is a servo's.
         if self.kinematic_input(input) != Kinematic::Displacement || one.state != one.v {
@@ -101,7 +102,9 @@ impl Finder<'_> {
             let [held, given] = [x, input].map(|s| constant_coefficient(self.simulation, term, s));
             let (held, given) = (held?, given?);
             let scale = quotient(-given, held.clone());
-            (self.is_estimated(&held, one) && scale.symbols().is_empty() && !is_negative(&scale)).then_some(scale)
+            let known = |s: &String| self.simulation.parameter(s).is_none_or(|p| p.fixed);
+            let is_known = scale.symbols().iter().all(known);
+            (self.is_estimated(&held, one) && is_known && !is_negative(&scale)).then_some(scale)
         })
     }
 }
@@ -141,5 +144,14 @@ mod tests {
         assert!(driven("(n*(0.001*u - q2) - k*q2 - c*w2)/J").is_empty());
         let tyre = driven("(k*(0.001*u - q2) - c*w2)/J");
         assert_eq!(tyre, [["q2 - 0.001*u", "w2 - 0.001*d(u)", "k", "-w2"].map(str::to_owned)]);
+        // What is known of the input's travel is a number, a constant or a parameter that is fixed.
+        let pushed = |scale: &str| {
+            let spring = format!("(k*(u*{scale} - q2) - c*w2)/J");
+            slots_driven("rod_deg", Place::Connection, &[("q2", "w2", "rad"), ("w2", &spring, "rad/s")])
+        };
+        let rod = |scale: &str| [format!("q2 - {scale}*u"), format!("w2 - {scale}*d(u)"), "k".into(), "-w2".into()];
+        assert_eq!(pushed("pi/180"), [rod("pi/180")]);
+        assert_eq!(pushed("n"), [rod("n")]);
+        assert!(pushed("c").is_empty());
     }
 }

@@ -10,9 +10,9 @@ use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
 use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
+use crate::search::candidate::Candidate;
 use crate::search::explore::Explored;
 use crate::search::rounding::Converter;
-use crate::search::screen::Candidate;
 
 /// What is believed.
 pub struct Judgement<'d> {

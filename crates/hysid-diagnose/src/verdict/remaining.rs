@@ -11,7 +11,8 @@ use crate::model::base::{Base, MAX_AR};
 use crate::model::hypothesis::{Hypothesis, block_score};
 use crate::openset::needed::{Refitted, likelier};
 use crate::openset::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
-use crate::search::{Search, leaves_more};
+use crate::search::Search;
+use crate::search::given_up::leaves_more;
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;

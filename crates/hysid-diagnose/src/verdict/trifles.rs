@@ -4,7 +4,7 @@
 //! something small that is left.
 
 use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
-use crate::search::leaves_more;
+use crate::search::given_up::leaves_more;
 use crate::text::number;
 
 /// Share of a set's log evidence that a member must bring.

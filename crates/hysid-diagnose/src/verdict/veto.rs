@@ -9,7 +9,7 @@ use crate::evidence::{difference, norm2};
 use crate::file::RemainingRecord;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, OnBlocks};
-use crate::search::leaves_more;
+use crate::search::given_up::leaves_more;
 
 /// Share of the log likelihood that a set must gain under the noise of the simulation as it is for its effects to explain.
 const EXPLAINED: f64 = 0.5;

@@ -11,7 +11,7 @@ use crate::mechanism::Family;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, OnBlocks, Setting, block_score};
 use crate::search::compose::best_of;
-use crate::search::leaves_more;
+use crate::search::given_up::leaves_more;
 
 /// Weight of the log evidence in the probabilities.
 pub const EVIDENCE_WEIGHT: f64 = 0.4;
