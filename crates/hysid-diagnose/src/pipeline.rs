@@ -15,7 +15,7 @@ use crate::data::intake::{Intake, intake};
 use crate::error::DiagnoseError;
 use crate::evidence::NoiseModel;
 use crate::experiment::astray::astray;
-use crate::experiment::fresh::gamble;
+use crate::experiment::gamble::{gamble, safest};
 use crate::experiment::separating;
 use crate::file::*;
 use crate::model::Count;
@@ -287,6 +287,12 @@ fn taken_for_forces(simulation: &Simulation, noise: &[NoiseModel]) -> Vec<String
 }
 
 /// What is written as the augmented simulation.
+/// The effects of a set, for people.
+fn listed(set: &Hypothesis<'_>) -> String {
+    let each: Vec<String> = set.effects.iter().map(|e| format!("{} at {}", e.mechanism.id, e.slot)).collect();
+    format!("the set of {}", each.join(" and "))
+}
+
 struct Written<'d> {
     /// The set of effects, as a place in the pool; 0 where none is written.
     set: usize,
@@ -307,15 +313,27 @@ fn written<'d>(
     let unfinished = search.setting.budget.unfinished();
     let foreign = judged.rest.foreign && !unfinished;
     let risk = if winner > 0 && !vetoed { gamble(&search.setting, &judged.contest(pool)) } else { None };
+    let may_be_written = |i| Judgement::may_be_written(found, i);
+    let instead = risk.and_then(|_| safest(&search.setting, &judged.contest(pool), may_be_written));
     if let Some(share) = risk {
-        file.notes.push(format!("on the recorded inputs mirrored, reversed in time or doubled the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): these effects are not written, since they may be worse than nothing there", number(share)));
+        let words = match instead {
+            Some(i) => format!("{} is written, which is nearly as likely and goes less far astray", listed(&pool[i])),
+            None => "these effects are not written, since they may be worse than nothing there".into(),
+        };
+        file.notes.push(format!("on the recorded inputs mirrored, reversed in time or doubled the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): {words}", number(share)));
     }
     // Another recording sees another course of what wanders: what follows this one is worse than nothing there.
     let believed = winner > 0 && !vetoed && risk.is_none();
     let wanders = judged.wanders().filter(|_| believed);
     let overdone = judged.overdone(pool).filter(|_| believed);
     let steady = if wanders.is_some() || overdone.is_some() { judged.steady(pool) } else { winner };
-    let set = if believed && !foreign { steady } else { 0 };
+    let set = if foreign {
+        0
+    } else if believed {
+        steady
+    } else {
+        instead.unwrap_or(0)
+    };
     let written = if set > 0 { "it is not written, and the other effects are" } else { "the effects are not written" };
     if let Some(Effect { mechanism, slot, .. }) = overdone {
         file.notes.push(format!(

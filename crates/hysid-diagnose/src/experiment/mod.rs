@@ -9,6 +9,7 @@
 
 pub mod astray;
 pub mod fresh;
+pub mod gamble;
 
 use hysid_plant::{Drive, Simulation};
 use hysid_signal::Excitation;

@@ -197,6 +197,15 @@ impl<'d> Judgement<'d> {
         best.effects.iter().find(|e| overdone(&best.base, e))
     }
 
+    /// Whether nothing speaks against writing a set of the pool, as nothing must against the winner.
+    pub fn may_be_written(found: &Explored<'_, 'd>, set: usize) -> bool {
+        let Explored { search, pool, least, .. } = found;
+        let (none, set) = (&pool[0], &pool[set]);
+        let blocks = [none, set].map(|h| block_score(&search.setting, h));
+        let speaks = veto(none, least.as_ref().unwrap_or(none), set, blocks.each_ref());
+        speaks.is_none() && !set.effects.iter().any(|e| overdone(&set.base, e))
+    }
+
     /// The sets as they stand against each other.
     pub fn contest<'a>(&'a self, pool: &'a [Hypothesis<'d>]) -> Contest<'a, 'd> {
         Contest { pool, weighed: &self.weighed, probability: &self.probability, winner: self.winner }
