@@ -4,6 +4,7 @@
 //! decided there, and the rest of the step follows. In forward derivatives the length of the shortened step carries the
 //! derivative of the crossing time, so that sensitivities go through events.
 
+use super::crossing::Crossing;
 use super::machine::Machine;
 use super::memory::Phase;
 use super::surface::Mode;
@@ -12,8 +13,6 @@ use crate::number::{Single, Span};
 
 /// Most events in one step; what is beyond is integrated across.
 const MAX_EVENTS: usize = 12;
-/// How near to a crossing the search goes, as a share of the step's way across; Newton's correction squares it.
-const NEAR: f64 = 1e-6;
 
 impl<N: Single> Machine<'_, N> {
     pub fn set_mode(&mut self, surface: usize, mode: Mode) {
@@ -24,7 +23,7 @@ impl<N: Single> Machine<'_, N> {
 
     /// How far each surface is from its event at `x`, `since` after `tau`, into `distances`: positive before, negative after.
     #[inline(always)]
-    fn measure_distances<S: Span<N>>(&mut self, x: &[N], tau: S, since: S, step: S) {
+    pub fn measure_distances<S: Span<N>>(&mut self, x: &[N], tau: S, since: S, step: S) {
         let model = self.model;
         if !self.any_stuck && model.plain_surfaces {
             self.distances.clear();
@@ -148,8 +147,7 @@ impl<N: Single> Machine<'_, N> {
             self.step(tau, h);
             self.measure_trial(tau, h);
             if self.distances.iter().any(|d| *d < 0.0) {
-                self.tau = N::lift(tau);
-                self.go_through_events(N::lift(h), true);
+                self.go_through_fired(tau, h);
                 return;
             }
         } else {
@@ -174,12 +172,12 @@ impl<N: Single> Machine<'_, N> {
             let next = self.cells.iter().filter_map(|cell| cell.next_jump(period, from, until));
             let Some(at) = next.min_by(|a, b| a.value().total_cmp(&b.value())) else { break };
             let length = at.sub(N::lift(sample_s)).sub(self.tau);
-            self.go_through_events(length, false);
+            self.go_through_events(self.tau, length, false);
             left = left.sub(length);
             split = true;
         }
         if split {
-            self.go_through_events(left, false);
+            self.go_through_events(self.tau, left, false);
         }
         split
     }
@@ -201,73 +199,91 @@ impl<N: Single> Machine<'_, N> {
 
     /// As [`Machine::advance`], where a step of that length has been tried in vain and `distances` are those at its end.
     pub fn advance_through_events(&mut self, tau: f64, h: f64, distances: impl Iterator<Item = f64>) {
+        // The slopes of the step tell where the crossing is.
+        self.step(tau, h);
         self.distances.clear();
         self.distances.extend(distances);
-        self.tau = N::lift(tau);
-        self.go_through_events(N::lift(h), true);
+        self.go_through_fired(tau, h);
     }
 
-    /// Goes on by `h` from `self.tau`; where a step of that length was `tried` in vain, `distances` are those at its end.
-    fn go_through_events(&mut self, h: N, tried: bool) {
+    /// Goes on where a step has been tried in vain. What remembers is told the moments with their derivatives.
+    fn go_through_fired(&mut self, tau: f64, h: f64) {
+        if self.cells.is_empty() {
+            self.go_through_events(tau, h, true);
+        } else {
+            self.go_through_events(N::lift(tau), N::lift(h), true);
+        }
+    }
+
+    /// Goes on by `h` from `tau`; where a step of that length was `tried` in vain, `distances` are those at its end.
+    ///
+    /// Where lengths are plain, what moves a crossing's moment is told by the state: it has the derivative of the time before at the rates before, and of the time
+    /// after at those after (M. A. Aizerman and F. R. Gantmacher, Quarterly Journal of Mechanics and Applied Mathematics 11 (1958), 163). Else the lengths carry it.
+    fn go_through_events<S: Span<N>>(&mut self, mut tau: S, h: S, tried: bool) {
         let mut rest = h;
         for event in 0..MAX_EVENTS {
+            self.tau = tau.seconds();
             if event > 0 || !tried {
                 // Another surface's event may have jumped the forces.
-                if self.any_stuck && self.release(rest) {
+                if self.any_stuck && self.release(rest.seconds()) {
                     continue;
                 }
-                self.step(self.tau, rest);
-                self.measure_trial(self.tau, rest);
+                self.step(tau, rest);
+                self.measure_trial(tau, rest);
                 if self.distances.iter().all(|d| *d >= 0.0 || d.is_nan()) {
-                    self.accept_rest(rest);
-                    return;
+                    return self.accept_rest(tau, rest);
                 }
             }
             let at_end = self.distances.clone();
-            let Some((at, surface)) = self.locate(rest.value(), &at_end) else {
+            let Some(Crossing { length, surface, moved }) = self.cross(tau, rest, &at_end) else {
                 // It turns back at once: nothing moves, the mode is decided anew.
                 if let Some(surface) = at_end.iter().position(|d| *d < 0.0) {
                     self.decide(surface);
                 }
                 continue;
             };
-            let mut length = N::lift(at);
-            if self.modes[surface] != Mode::Stuck {
-                // The derivative of the crossing time, and one Newton correction of its value.
-                let (s, rate) = self.argument_after(surface, length);
-                let correction = s.div(N::lift(rate));
-                if correction.value().abs() <= 1e-3 * rest.value() {
-                    length = length.sub(correction);
-                }
-            }
-            self.step(self.tau, length);
             let sign = self.sigma[surface].value();
-            self.accept_rest(length);
-            rest = rest.sub(length);
+            self.accept_rest(tau, length);
+            (tau, rest) = (tau.plus(length), rest.minus(length));
             if self.modes[surface] == Mode::Stuck {
                 self.set_mode(surface, Mode::of(sign));
             } else {
                 self.decide(surface);
+                if S::PLAIN && self.directions > 0 {
+                    self.jump(moved);
+                }
             }
             if rest.value() <= 1e-9 * h.value() {
                 return;
             }
         }
-        self.step(self.tau, rest);
-        self.accept_rest(rest);
+        self.step(tau, rest);
+        self.accept_rest(tau, rest);
         self.refresh();
     }
 
-    /// Accepts `trial`, which is `h` after `self.tau`.
-    fn accept_rest(&mut self, h: N) {
-        self.accept(self.tau, h);
-        self.tau = self.tau.add(h);
+    /// Takes the derivatives of the state from an event back to the moment at which it falls, with the rates after it.
+    fn jump(&mut self, moved: N) {
+        let zero = N::lift(0.0);
+        let moment = self.moment(self.tau, zero, zero, Phase::Event);
+        let mut x = std::mem::take(&mut self.x);
+        let mut k = std::mem::take(&mut self.spare);
+        self.moded_flow(&x, &moment, &mut k);
+        x.iter_mut().zip(&k).for_each(|(x, k)| *x = x.sub(k.mul(moved)));
+        self.spare = k;
+        self.x = x;
     }
 
-    /// A surface's argument after a step of this length from `self.tau`, and the value of its rate there.
-    fn argument_after(&mut self, surface: usize, length: N) -> (N, f64) {
-        self.step(self.tau, length);
-        let moment = self.moment(self.tau.add(length), length, length, Phase::Inside);
+    /// Accepts `trial`, which is `h` after `tau`, and goes there.
+    fn accept_rest<S: Span<N>>(&mut self, tau: S, h: S) {
+        self.accept(tau, h);
+        self.tau = tau.plus(h).seconds();
+    }
+
+    /// A surface's argument after a step of this length from `tau`, and the value of its rate there; `trial` is the state and `spare` its rate.
+    pub fn argument_after<S: Span<N>>(&mut self, surface: usize, tau: S, length: S) -> (N, f64) {
+        self.step(tau, length);
+        let moment = self.moment(tau.plus(length), length, length, Phase::Inside);
         let trial = std::mem::take(&mut self.trial);
         let mut k = std::mem::take(&mut self.spare);
         self.moded_flow(&trial, &moment, &mut k);
@@ -279,69 +295,5 @@ impl<N: Single> Machine<'_, N> {
         self.spare = k;
         self.trial = trial;
         (s, rate)
-    }
-
-    /// The least distance (in shares of those at the whole step's end) of the surfaces that fired, after a step of length `h`.
-    fn nearest(&mut self, h: f64, whole: f64, fired: &[(usize, f64)]) -> (f64, usize) {
-        let tau = self.tau.value();
-        if h > 0.0 {
-            self.step(tau, h);
-            let trial = std::mem::take(&mut self.trial);
-            self.measure_distances(&trial, tau, h, whole);
-            self.trial = trial;
-        } else {
-            let x = std::mem::take(&mut self.x);
-            self.measure_distances(&x, tau, 0.0, whole);
-            self.x = x;
-        }
-        let scaled = fired.iter().map(|&(i, scale)| (self.distances[i] / scale, i));
-        scaled.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NAN, 0))
-    }
-
-    /// The length of step at which the first event falls, and its surface; none where a surface is left only to return to it
-    /// at once.
-    fn locate(&mut self, whole: f64, at_end: &[f64]) -> Option<(f64, usize)> {
-        let fired: Vec<(usize, f64)> =
-            at_end.iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, d)| (i, -d)).collect();
-        let (mut high, mut at_high) = (whole, -1.0);
-        let (mut low, mut at_low) = (0.0, self.nearest(0.0, whole, &fired).0);
-        let mut surface = fired.first().map_or(0, |f| f.0);
-        for _ in 0..8 {
-            if at_low > 0.0 {
-                break;
-            }
-            // The surface is just being left: look for a point on the way at which it has been.
-            low = if low == 0.0 { 0.5 * high } else { low };
-            let (value, which) = self.nearest(low, whole, &fired);
-            if value > 0.0 {
-                at_low = value;
-            } else {
-                (high, at_high, surface) = (low, value, which);
-                low *= 0.5;
-            }
-        }
-        if at_low <= 0.0 || at_low.is_nan() {
-            return None;
-        }
-        for i in 0..60 {
-            if high - low <= 1e-13 * whole {
-                break;
-            }
-            let secant = (low * at_high - high * at_low) / (at_high - at_low);
-            let middle = if i % 8 == 7 || !(secant > low && secant < high) { 0.5 * (low + high) } else { secant };
-            let (value, which) = self.nearest(middle, whole, &fired);
-            let near = if self.modes[which] == Mode::Stuck { 1e-14 } else { NEAR };
-            if value.abs() < near {
-                return Some((middle, which));
-            }
-            if value > 0.0 {
-                (low, at_low) = (middle, value);
-                at_high *= 0.5;
-            } else {
-                (high, at_high, surface) = (middle, value, which);
-                at_low *= 0.5;
-            }
-        }
-        Some((high, surface))
     }
 }

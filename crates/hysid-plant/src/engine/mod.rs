@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod compile;
+mod crossing;
 mod differentiate;
 mod drive;
 mod events;

@@ -60,10 +60,13 @@ pub(crate) trait Single: Number {}
 pub(crate) trait Span<N>: Copy {
     /// Whether it has no tangents.
     const PLAIN: bool;
+    /// Of a number, whose tangents a plain one leaves out.
+    fn of(seconds: N) -> Self;
     fn seconds(self) -> N;
     fn value(self) -> f64;
     fn times(self, x: N) -> N;
     fn plus(self, other: Self) -> Self;
+    fn minus(self, other: Self) -> Self;
     fn part(self, share: f64) -> Self;
     /// `level + slope * self`.
     fn line(self, level: f64, slope: f64) -> N;
@@ -71,6 +74,10 @@ pub(crate) trait Span<N>: Copy {
 
 impl<N: Number> Span<N> for f64 {
     const PLAIN: bool = true;
+    #[inline(always)]
+    fn of(seconds: N) -> Self {
+        seconds.value()
+    }
     #[inline(always)]
     fn seconds(self) -> N {
         N::lift(self)
@@ -88,6 +95,10 @@ impl<N: Number> Span<N> for f64 {
         self + other
     }
     #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        self - other
+    }
+    #[inline(always)]
     fn part(self, share: f64) -> Self {
         self * share
     }
@@ -99,6 +110,10 @@ impl<N: Number> Span<N> for f64 {
 
 impl<N: Number> Span<N> for N {
     const PLAIN: bool = false;
+    #[inline(always)]
+    fn of(seconds: Self) -> Self {
+        seconds
+    }
     #[inline(always)]
     fn seconds(self) -> Self {
         self
@@ -114,6 +129,10 @@ impl<N: Number> Span<N> for N {
     #[inline(always)]
     fn plus(self, other: Self) -> Self {
         self.add(other)
+    }
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        self.sub(other)
     }
     #[inline(always)]
     fn part(self, share: f64) -> Self {
