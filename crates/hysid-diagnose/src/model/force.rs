@@ -5,12 +5,15 @@
 //! friction holds for some of them, or its smoothed sign is steep, the moving ones decide. The error of a simulation that follows the recorded input
 //! has the response of the simulation as it is: a loop that the simulation contains is closed in it, one behind the recorded input is not.
 
-use hysid_plant::Simulation;
+use hysid_plant::{Linearisation, Simulation};
+use nalgebra::{DMatrix, DVector, Schur};
 
 use super::Model;
 use crate::evidence::ForcePath;
 use crate::slot::{Place, Structure, Target};
 
+/// Iterations for each state in which eigenvalues are found.
+const MOST_ITERATIONS: usize = 100;
 /// Instants at which the equations are linearised.
 const INSTANTS: usize = 24;
 /// Most states at which a force may enter.
@@ -41,12 +44,29 @@ pub fn force_paths(model: &Model<'_>, theta: &[f64], pushed: &[String]) -> Vec<V
     if points.is_empty() {
         return Vec::new();
     }
-    let a: Vec<f64> = (0..n * n).map(|i| middle(points.iter().map(|p| p.a[i]))).collect();
+    let a = middle_flow(&points, n);
     let c: Vec<f64> = (0..n * simulation.outputs.len()).map(|i| middle(points.iter().map(|p| p.c[i]))).collect();
     let period_s = model.data().row_period_s();
     c.chunks_exact(n)
         .map(|c| entries.iter().filter_map(|&entry| ForcePath::held(&a, entry, c, period_s)).collect())
         .collect()
+}
+
+/// The matrix of the state derivatives by the states, by rows, as it is for most of the time.
+fn middle_flow(points: &[Linearisation], states: usize) -> Vec<f64> {
+    (0..states * states).map(|i| middle(points.iter().map(|p| p.a[i]))).collect()
+}
+
+/// The eigenvalues of a simulation that swing, as it moves for most of the time: real and imaginary part, in 1/s, of one of each pair.
+pub fn resonances(model: &Model<'_>, theta: &[f64]) -> Vec<[f64; 2]> {
+    let (n, points) = (model.simulation().states.len(), model.linearised(theta, INSTANTS));
+    let a = middle_flow(&points, n);
+    if points.is_empty() || !a.iter().all(|x| x.is_finite()) {
+        return Vec::new();
+    }
+    let form = Schur::try_new(DMatrix::from_row_slice(n, n, &a), f64::EPSILON, MOST_ITERATIONS * n);
+    let all = form.map_or_else(|| DVector::zeros(0), |form| form.complex_eigenvalues());
+    all.iter().filter(|l| l.im > 0.0).map(|l| [l.re, l.im]).collect()
 }
 
 /// Whether the simulation forgets by itself where it was, all along the recording: there are units for its states in which each falls back, at any
@@ -141,6 +161,16 @@ mod tests {
     #[test]
     fn a_loop_in_the_simulation_is_closed() {
         assert_eq!(paths("8*(u - q) - b*w"), by_hand(4.0));
+    }
+
+    #[test]
+    fn resonances_are_those_of_the_characteristic_polynomial() {
+        // 2 q'' + 0.5 q' + 8 q beside a lag, and a drive that nothing holds.
+        let swings = [("q", "w", 0.0), ("w", "(8*(u - q) - b*w)/2", 0.0), ("s", "q - 3*s", 0.0)];
+        let [[re, im]] = asked(&swings, 0.0, resonances)[..] else { panic!("one pair") };
+        assert!((re + 0.125).abs() < 1e-9 && (im - (4.0_f64 - 0.125 * 0.125).sqrt()).abs() < 1e-9, "{re} {im}");
+        assert!(asked(&swings[..2], 0.0, |m, _| resonances(m, &[f64::NAN])).is_empty());
+        assert!(asked(&[("q", "w", 0.0), ("w", "(u - b*w)/2", 0.0)], 0.0, resonances).is_empty());
     }
 
     #[test]

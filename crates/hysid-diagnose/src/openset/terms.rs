@@ -111,6 +111,11 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             found.extend(factors.map(|i| shapes::product(named(i), named(other))));
             found.extend(inputs.iter().map(|(u, input)| shapes::product((u, input), named(other))));
         }
+        // What drives another part may drive this one too.
+        let is_driven_by = |u: &str| matches!(place, Place::State(i) if simulation.states[*i].derivative.uses(u));
+        if own > 0 {
+            found.extend(inputs.iter().filter(|(u, _)| !is_driven_by(u)).map(|(u, x)| shapes::proportional((u, x))));
+        }
         if let (Some(v), Some(_)) = (site.own.iter().position(|s| s.velocity), &site.acceleration) {
             let x = (0..own).find(|i| *i != v).map(named);
             for (place, rate) in &site.parts {

@@ -93,10 +93,15 @@ impl Finder<'_> {
         Some(load.simplified())
     }
 
-    /// The inputs that press, by their unit or for all that is known, and that the simulation as the user wrote it makes no use of, as they are offered.
+    /// The inputs that press, by their unit or for all that is known, and that move nothing in the simulation as the user wrote it, as they are offered.
     pub(super) fn idle_loads(&self) -> Vec<String> {
+        // What a sensor shows of an input loads nothing: of a static relation the outputs are the equations.
+        let moving: Vec<&Expr> = match self.original.is_static() {
+            true => self.original.expressions().into_iter().map(|(_, e)| e).collect(),
+            false => self.original.states.iter().map(|s| &s.derivative).collect(),
+        };
         let idle = |symbol: &str| {
-            !self.original.expressions().into_iter().any(|(_, e)| e.uses(symbol))
+            !moving.iter().any(|e| e.uses(symbol))
                 && self.simulation.unit_of(symbol).is_none_or(|u| presses(&u))
                 && self.kinematic_input(symbol) == Kinematic::Neither
         };
@@ -261,5 +266,17 @@ mod tests {
             Structure::of(&simulation).slots.iter().any(|s| s.has("control"))
         };
         assert!(guide("coil_V") && !guide("clamp_N"));
+        // What moves nothing may load the guide, also where a sensor shows a share of it.
+        let loads = |derivative: &str, output: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.01\n[inputs]\nf = \"drive_N\"\nq = \"clamp_N\"\n[parameters]\nc = {{ value = 2.0, min = 0.1 }}\n[states]\n\
+                 x = {{ derivative = \"v\", initial = 0.0 }}\nv = {{ derivative = \"{derivative}\", initial = 0.0 }}\n[outputs]\ncell_N = \"{output}\"\n"
+            );
+            let simulation = Simulation::parse(&text, "guide.sim.toml").unwrap();
+            Structure::of(&simulation).slots.iter().find(|s| s.label == "state:v").unwrap().loads()
+        };
+        assert_eq!(loads("f - c*v", "90*x"), ["u_2", "u_1"]);
+        assert_eq!(loads("f - c*v", "90*x + 0.02*q"), ["u_2", "u_1"]);
+        assert_eq!(loads("f - q - c*v", "90*x"), ["u_1", "u_2"]);
     }
 }

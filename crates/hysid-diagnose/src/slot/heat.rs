@@ -5,6 +5,7 @@ use hysid_plant::{BinaryOp, Expr};
 
 use super::Slot;
 use super::algebra::{Factors, coefficient, only_parameters, product, signals_in};
+use super::connections::signed;
 use super::find::{Finder, has_unit};
 use super::motion::{Kinematic, Motion, force_of};
 use super::pattern::factors;
@@ -54,6 +55,17 @@ impl Finder<'_> {
         let first = voltages.first()?;
         let same = voltages.len() == uses && voltages.iter().all(|v| v == first);
         (same && !only_parameters(self.simulation, first)).then(|| first.clone() / Expr::symbol(resistance))
+    }
+
+    /// The current that is told by a flux linkage and flows through a resistance, as `psi/L` in `u - R*psi/L`.
+    pub(super) fn flux_current(&self, resistance: &str) -> Option<Expr> {
+        if !has_unit(self.simulation.unit_of(resistance), &["Ohm"]) {
+            return None;
+        }
+        self.simulation.states.iter().find_map(|state| {
+            let (_, current) = signed(coefficient(&state.derivative, resistance)?);
+            has_unit(self.simulation.unit_of_expr(&current), &["A"]).then_some(current)
+        })
     }
 
     /// Collects what is no parameter of each product that is divided by this one.
@@ -160,6 +172,24 @@ mod tests {
         let rate = |name: &str| at(name).quantity("v").map(|q| q.expression.to_string());
         assert_eq!(["R", "b", "K"].map(rate), ["i", "w", "w"].map(|v| Some(v.to_owned())));
         assert!(at("R").dissipates());
+    }
+
+    #[test]
+    fn a_coil_that_is_told_by_its_flux_linkage_is_heated_by_its_current() {
+        let rate = |unit: &str, voltage: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 1e-4\n[inputs]\nu = \"amp_V\"\n[parameters]\nL = {{ value = 3e-4, min = 1e-5, unit = \"H\" }}\n\
+                 R = {{ value = 0.1, min = 0.01, unit = \"{unit}\" }}\nT = {{ value = 3e-3, min = 1e-4, unit = \"s\" }}\n[states]\n\
+                 psi = {{ derivative = \"{voltage}\", initial = 0.0, unit = \"V s\" }}\ni = {{ derivative = \"(psi/L - i)/T\", initial = 0.0, unit = \"A\" }}\n\
+                 [outputs]\ncoil_A = \"psi/L\"\neddy_A = \"i\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "coil.sim.toml").unwrap()).slots;
+            let slot = slots.into_iter().find(|s| s.label == "parameter:R").unwrap();
+            (slot.quantity("v").map(|q| q.expression.to_string()), slot.dissipates())
+        };
+        assert_eq!(rate("Ohm", "u - R*psi/L"), (Some("psi/L".to_owned()), true));
+        assert_eq!(rate("Ohm", "u - R/L*psi"), (Some("psi/L".to_owned()), true));
+        assert_eq!(rate("1/s", "u - R*psi"), (None, false));
     }
 
     #[test]

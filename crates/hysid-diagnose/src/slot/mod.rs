@@ -240,7 +240,7 @@ impl Slot {
         !self.entering().is_empty()
     }
 
-    /// What may load a guide or a gear here, as it is offered: first recorded inputs that the simulation makes no use of (somebody recorded a clamping
+    /// What may load a guide or a gear here, as it is offered: first recorded inputs that move nothing in the simulation (somebody recorded a clamping
     /// force), then those that enter the equations here, then what other parts pass on. In a static force law the motion enters too, which loads nothing.
     pub(crate) fn loads(&self) -> Vec<String> {
         let pressing = |u: &String| self.quantity(u).and_then(|q| q.unit.as_ref()).is_some_and(presses);

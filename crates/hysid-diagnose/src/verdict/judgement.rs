@@ -2,12 +2,14 @@
 
 use super::firmness::{firmness, likelihoods};
 use super::remaining::Remaining;
+use super::resonance::is_of_the_simulation;
 use super::trifles::{Trifle, without_trifles};
 use super::veto::{found_too_little, veto};
 use super::wanders::{Wanders, is_one_course, wanders};
 use super::weigh::*;
 use super::{FIRM, Hypothesis as Weighed, Support, verdict};
 use crate::file::{RemainingRecord, VerdictKind};
+use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::candidate::Candidate;
@@ -97,7 +99,7 @@ impl<'d> Judgement<'d> {
             s.discount(w.as_ref().map_or(0.0, |w| w.probability));
         }
         // On four turns a play and a sum of plays are one law: what a law needs to be told from its neighbours it needs to be told firmly.
-        let lacking = lacking(best, candidates);
+        let lacking = lacking(&pool[0].base, best, candidates);
         support.iter_mut().zip(&lacking).filter(|(_, l)| l.is_some()).for_each(|(s, _)| s.weaken());
         let remaining = rest.record(pool, winner);
         // Where most of the mismatch is left, and a random force explains that, what the effects gain is as likely a part of what the force does.
@@ -221,15 +223,19 @@ fn place_of(sets: &[(Key, f64)], key: &Key, least: f64) -> usize {
 const AT_AN_END: &str =
     "so near to an end of the recording a change is what a state that nobody knows leaves as it dies away";
 
+/// What a resonance may be that the simulation has itself.
+const ITS_OWN: &str = "the simulation has this resonance itself: another way into it would look the same";
+
 /// What the recording lacks for a firm answer about each effect of the best set; `None` where nothing is lacking.
-fn lacking(best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String>> {
+fn lacking(none: &Base<'_>, best: &Hypothesis<'_>, candidates: &[Candidate]) -> Vec<Option<String>> {
     let values = best.base.values();
     let told = |e: &Effect| {
         let id = e.mechanism.id;
         let at_an_end = best.changes_at_an_end(e).then_some(AT_AN_END);
+        let own = || is_of_the_simulation(none, &best.base, e).then_some(ITS_OWN);
         let shapes = e.written.shapes.iter();
         let confused = shapes.filter_map(|s| s.confused(*values.parameters.get(&s.name)?)).next();
-        if let Some(confused) = at_an_end.or(confused) {
+        if let Some(confused) = at_an_end.or(confused).or_else(own) {
             return Some(format!("{id}: this is not firm, since {confused}"));
         }
         let candidate = candidates.iter().find(|c| c.mechanism.id == id && c.slot.is_at(&e.slot))?;

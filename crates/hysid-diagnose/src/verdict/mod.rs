@@ -10,6 +10,7 @@ pub(crate) mod judgement;
 mod place;
 pub mod reliability;
 pub(crate) mod remaining;
+mod resonance;
 pub(crate) mod trifles;
 mod veto;
 mod wanders;
