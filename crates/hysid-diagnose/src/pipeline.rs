@@ -286,13 +286,13 @@ fn taken_for_forces(simulation: &Simulation, noise: &[NoiseModel]) -> Vec<String
         .collect()
 }
 
-/// What is written as the augmented simulation.
 /// The effects of a set, for people.
 fn listed(set: &Hypothesis<'_>) -> String {
     let each: Vec<String> = set.effects.iter().map(|e| format!("{} at {}", e.mechanism.id, e.slot)).collect();
-    format!("the set of {}", each.join(" and "))
+    each.join(" and ")
 }
 
+/// What is written as the augmented simulation.
 struct Written<'d> {
     /// The set of effects, as a place in the pool; 0 where none is written.
     set: usize,
@@ -317,7 +317,10 @@ fn written<'d>(
     let instead = risk.and_then(|_| safest(&search.setting, &judged.contest(pool), may_be_written));
     if let Some(share) = risk {
         let words = match instead {
-            Some(i) => format!("{} is written, which is nearly as likely and goes less far astray", listed(&pool[i])),
+            Some(i) => format!(
+                "the set of {} is written, which is nearly as likely and goes less far astray",
+                listed(&pool[i])
+            ),
             None => "these effects are not written, since they may be worse than nothing there".into(),
         };
         file.notes.push(format!("on the recorded inputs mirrored, reversed in time or doubled the sets of effects that remain differ: each taken for the true one with its probability, the set that is told would make {} of the squared errors that it and the simulation as it is make together (a half: no better than that): {words}", number(share)));

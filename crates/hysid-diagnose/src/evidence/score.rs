@@ -22,7 +22,7 @@ pub const INSIDE: f64 = 1e-12;
 #[derive(Debug, Clone)]
 pub struct FeatureGroup {
     /// Orthonormal columns that span the effect's response outside the simulation's own tangent space; in single precision, since those of all effects are what
-    /// fills the memory. What a column of a thousand rows and more explains is off by less than 1e-9 of the whole.
+    /// fills the memory of a long recording.
     pub columns: Vec<Vec<f32>>,
     /// Share of the first column's whitened response that the simulation's own parameters can absorb, from 0 to 1.
     pub concealment: f64,

@@ -61,7 +61,7 @@ fn middle_flow(points: &[Linearisation], states: usize) -> Vec<f64> {
 pub fn resonances(model: &Model<'_>, theta: &[f64]) -> Vec<[f64; 2]> {
     let (n, points) = (model.simulation().states.len(), model.linearised(theta, INSTANTS));
     let a = middle_flow(&points, n);
-    if points.is_empty() || !a.iter().all(|x| x.is_finite()) {
+    if n == 0 || points.is_empty() || !a.iter().all(|x| x.is_finite()) {
         return Vec::new();
     }
     let form = Schur::try_new(DMatrix::from_row_slice(n, n, &a), f64::EPSILON, MOST_ITERATIONS * n);
@@ -120,14 +120,14 @@ mod tests {
     use crate::model::Values;
     use hysid_plant::Drive;
 
-    /// What is asked of states with these derivatives and initial values, the first of them recorded, under an input that goes to and fro around a mean.
+    /// What is asked of states with these derivatives and initial values, the first of them (the input where there is none) recorded, under an input that goes to and fro around a mean.
     fn asked<T>(states: &[(&str, &str, f64)], mean: f64, ask: impl Fn(&Model<'_>, &[f64]) -> T) -> T {
         let list: String = (states.iter())
             .map(|(name, derivative, initial)| {
                 format!("{name} = {{ derivative = \"{derivative}\", initial = {initial:?} }}\n")
             })
             .collect();
-        let seen = states[0].0;
+        let seen = states.first().map_or("b*u", |s| s.0);
         let text = format!(
             "[time]\nperiod_s = 0.05\n[inputs]\nu = \"u_Nm\"\n[parameters]\nb = {{ value = 0.5, min = 0.0 }}\n[states]\n{list}[outputs]\nq_rad = \"{seen}\"\n"
         );
@@ -171,6 +171,7 @@ mod tests {
         assert!((re + 0.125).abs() < 1e-9 && (im - (4.0_f64 - 0.125 * 0.125).sqrt()).abs() < 1e-9, "{re} {im}");
         assert!(asked(&swings[..2], 0.0, |m, _| resonances(m, &[f64::NAN])).is_empty());
         assert!(asked(&[("q", "w", 0.0), ("w", "(u - b*w)/2", 0.0)], 0.0, resonances).is_empty());
+        assert!(asked(&[], 0.0, resonances).is_empty(), "a static relation");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Steps through switching events.
 //!
-//! A step that crosses a switching surface is shortened to the crossing (by the Illinois form of the secant), the mode is
-//! decided there, and the rest of the step follows. In forward derivatives the length of the shortened step carries the
-//! derivative of the crossing time, so that sensitivities go through events.
+//! A step that crosses a switching surface is shortened to the crossing (`crossing`), the mode is decided there, and the rest of the step follows. Forward
+//! derivatives go through events: where nothing remembers the state is taken to the moment at which the event falls, by the rates before it and after it;
+//! else the length of the shortened step carries the derivative of the crossing time.
 
 use super::crossing::Crossing;
 use super::machine::Machine;
