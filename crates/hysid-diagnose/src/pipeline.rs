@@ -314,7 +314,9 @@ fn written<'d>(
     let foreign = judged.rest.foreign && !unfinished;
     let risk = if winner > 0 && !vetoed { gamble(&search.setting, &judged.contest(pool)) } else { None };
     let may_be_written = |i| Judgement::may_be_written(found, i);
-    let instead = risk.and_then(|_| safest(&search.setting, &judged.contest(pool), may_be_written));
+    // Where the catalogue does not hold what is missing, no other set of it is written either.
+    let instead = risk.filter(|_| file.verdict != VerdictKind::NotInCatalogue);
+    let instead = instead.and_then(|_| safest(&search.setting, &judged.contest(pool), may_be_written));
     if let Some(share) = risk {
         let words = match instead {
             Some(i) => format!(

@@ -169,7 +169,7 @@ mod tests {
         let g = FeatureGroup::new(&[vec![3.0, 4.0, 0.0, 0.0]], &layout, &w, &own).unwrap();
         assert!((g.concealment - 9.0 / 25.0).abs() < 1e-12);
         assert!((g.norm - 4.0).abs() < 1e-12);
-        assert!((g.amplitudes(&[0.0, 8.0, 0.0, 0.0], 1)[0] - 2.0).abs() < SINGLY);
+        assert!((g.amplitudes(&[0.0, 8.0, 0.0, 0.0], 1)[0] - 2.0).abs() < 1e-12);
         let two = FeatureGroup::new(&[vec![0.0, 2.0, 1.0, 0.0], vec![0.0, 1.0, 3.0, 0.5]], &layout, &w, &own).unwrap();
         let a = two.amplitudes(&[0.0, 2.0 * 3.0 - 1.0, 3.0 - 3.0, -0.5], 2);
         assert!((a[0] - 3.0).abs() < SINGLY && (a[1] + 1.0).abs() < SINGLY, "{a:?}");

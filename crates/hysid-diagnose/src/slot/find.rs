@@ -311,7 +311,7 @@ impl Finder<'_> {
             if let (None, Some(current)) = (of_a_part, self.current_through(name)) {
                 // What a resistance makes of a current is what a damper makes of a velocity.
                 slot.offer(self.simulation, "v", Expr::symbol(current));
-            } else if let Some(current) = self.driven_current(name).or_else(|| self.flux_current(name)) {
+            } else if let Some(current) = self.resisted_current(name) {
                 slot.offer(self.simulation, "v", current);
             } else if let Some(motion) = of_a_part.or(self.motions.first()) {
                 self.offer_motion(&mut slot, motion);

@@ -41,11 +41,14 @@ impl Finder<'_> {
         found.iter().all(|e| ends(e) == ends(first)).then(|| first.clone())
     }
 
+    /// The current through a resistance where it is no signal of the simulation.
+    pub(super) fn resisted_current(&self, parameter: &str) -> Option<Expr> {
+        let resists = has_unit(self.simulation.unit_of(parameter), &["Ohm"]);
+        resists.then(|| self.driven_current(parameter).or_else(|| self.flux_current(parameter)))?
+    }
+
     /// The current that a voltage drives through a resistance, as `(u - K*w)/R`, where it is the same in all equations.
-    pub(super) fn driven_current(&self, resistance: &str) -> Option<Expr> {
-        if !has_unit(self.simulation.unit_of(resistance), &["Ohm"]) {
-            return None;
-        }
+    fn driven_current(&self, resistance: &str) -> Option<Expr> {
         let mut voltages = Vec::new();
         let mut uses = 0;
         for equation in self.equations() {
@@ -58,10 +61,7 @@ impl Finder<'_> {
     }
 
     /// The current that is told by a flux linkage and flows through a resistance, as `psi/L` in `u - R*psi/L`.
-    pub(super) fn flux_current(&self, resistance: &str) -> Option<Expr> {
-        if !has_unit(self.simulation.unit_of(resistance), &["Ohm"]) {
-            return None;
-        }
+    fn flux_current(&self, resistance: &str) -> Option<Expr> {
         self.simulation.states.iter().find_map(|state| {
             let (_, current) = signed(coefficient(&state.derivative, resistance)?);
             has_unit(self.simulation.unit_of_expr(&current), &["A"]).then_some(current)

@@ -82,8 +82,11 @@ impl<'d> Remaining<'d> {
         let imitates = winner > 0 && best.base.unexplained() > HARDLY_ANY.powi(2) * none.base.unexplained();
         let generic = if imitates || spectrum { search.open(none) } else { None };
         // That a further resonance has the frequency and the damping of one that the simulation has would be a coincidence.
-        let own = best.effects.iter().any(|e| is_of_the_simulation(&none.base, &best.base, e));
-        let outdone = |o: &OpenSet| told(o) && o.gain > explained + if own { -FAR_MORE } else { FAR_MORE };
+        let lead = || {
+            let own = best.effects.iter().any(|e| is_of_the_simulation(&none.base, &best.base, e));
+            if own { -FAR_MORE } else { FAR_MORE }
+        };
+        let outdone = |o: &OpenSet| told(o) && o.gain > explained + lead();
         let outdone = imitates && generic.as_ref().is_some_and(outdone);
         // What was not looked at is not known to be nothing.
         let left = seen.is_some() || test.as_ref().is_none_or(|t| t.tells(alpha) && !pushed);

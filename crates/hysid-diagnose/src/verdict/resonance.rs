@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::mechanism::Family;
 use crate::model::base::Base;
 use crate::model::force::resonances;
 use crate::model::hypothesis::Effect;
@@ -15,7 +16,7 @@ const ONE: f64 = 0.25;
 
 /// Whether an effect is a resonance beside the plant that `none`, the simulation without it, has itself, as far as `fitted` knows it.
 pub fn is_of_the_simulation(none: &Base<'_>, fitted: &Base<'_>, effect: &Effect) -> bool {
-    if effect.mechanism.id != "unmodelled_mode" || !matches!(effect.slot.place, Place::Sensor | Place::Sensors) {
+    if effect.mechanism.family != Family::ExtraMode || !matches!(effect.slot.place, Place::Sensor | Place::Sensors) {
         return false;
     }
     let value = |start: &str| {
