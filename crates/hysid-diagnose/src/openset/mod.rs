@@ -9,10 +9,6 @@
 //! Reference: P. Martins and L. A. Aguirre, Sufficient conditions for rate-independent hysteresis in autoregressive identified models,
 //! MSSP 75 (2016): memory without rate needs an operator with memory, which no static term imitates.
 
-mod course;
-mod factor;
-mod followed;
-mod modulation;
 pub mod needed;
 mod past;
 mod regress;
@@ -33,13 +29,13 @@ use crate::evidence::{Whitener, norm2};
 use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
-use course::Course;
-use factor::Varied;
 use regress::regress;
 use shapes::Kind;
 use signature::signature;
 use terms::{Term, terms};
-use varying::{Variation, Varying, varying};
+use varying::course::Course;
+use varying::written::WrittenVariation;
+use varying::{LikelyVariation, Variation, varying};
 use view::View;
 use written::Sparse;
 
@@ -101,7 +97,7 @@ pub enum Writable {
     /// Generic terms.
     Sparse(Sparse),
     /// A parameter that oscillates or follows a signal.
-    Varying(Varied),
+    Varying(WrittenVariation),
 }
 
 /// Most terms of a correction.
@@ -132,7 +128,7 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
     let sparse = chosen.max_by(|a, b| a.gain.total_cmp(&b.gain));
     // A walk cannot be written, and stands beside nothing.
     let most = sparse.as_ref().map_or(f64::NEG_INFINITY, |s| s.gain);
-    let stands = |v: &Varying| v.gain > most || !matches!(v.what.course, Course::Walk(_));
+    let stands = |v: &LikelyVariation| v.gain > most || !matches!(v.what.course, Course::Walk(_));
     let varying = varying(base, kind, &noises).into_iter().filter(stands).map(|found| of_varying(base, found));
     let mut all: Vec<OpenSet> =
         sparse.map(|sparse| of_terms(base, &terms, sparse)).into_iter().chain(varying).collect();
@@ -206,7 +202,7 @@ fn of_terms(base: &Base<'_>, terms: &[Term], best: Chosen) -> OpenSet {
 }
 
 /// A correction by a parameter that varies.
-fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
+fn of_varying(base: &Base<'_>, found: LikelyVariation) -> OpenSet {
     let columns: Vec<&[f64]> = found.columns.iter().map(Vec::as_slice).collect();
     let what = &found.what;
     let side = if matches!(what.course, Course::Follows(_)) { "plant" } else { "time" };
@@ -218,7 +214,7 @@ fn of_varying(base: &Base<'_>, found: Varying) -> OpenSet {
         block_ratio: block_ratio(base, &columns, &found.left, found.precision),
         gain: found.gain,
         choice: found.choice,
-        writable: Varied::new(&base.document(), &found).map(Writable::Varying),
+        writable: WrittenVariation::new(&base.document(), &found).map(Writable::Varying),
         words: Some(what.words()),
         rivals: Vec::new(),
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use hysid_signal::range;
 
-use super::course::Series;
+use super::varying::course::Series;
 use super::written::FORM;
 use crate::data::DataSet;
 use crate::evidence::quantile;

@@ -7,10 +7,10 @@ use hysid_plant::{Expr, Function, Simulation, Slot as Place};
 use hysid_signal::range;
 use rayon::prelude::*;
 
-use super::course::Series;
 use super::past;
 use super::shapes::{self, Kind, Shape};
 use super::sites::{Site, Symbol, sites};
+use super::varying::course::Series;
 use crate::model::along;
 use crate::model::base::Base;
 use crate::slot::{Sensed, Structure, sensed};

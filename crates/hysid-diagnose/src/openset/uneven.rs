@@ -17,7 +17,7 @@ use crate::model::base::{Base, NoiseKind};
 use crate::model::hypothesis::Effect;
 use crate::text::number;
 
-use super::modulation::Modulated;
+use super::varying::modulation::Modulated;
 use super::view::View;
 
 /// Odds beforehand that a law's strength is not the same everywhere. On development cases a single law that was named firmly at a level below

@@ -11,7 +11,7 @@ use super::place::place_of_change;
 use super::weigh::EVIDENCE_WEIGHT;
 use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, best_that_says};
-use crate::openset::varying::{Varying, varying};
+use crate::openset::varying::{LikelyVariation, varying};
 use crate::openset::{ODDS_AGAINST_MORE, gains_by_chance, noises};
 use crate::search::Search;
 use crate::text::number;
@@ -61,7 +61,7 @@ pub fn wanders(search: &Search<'_, '_>, pool: &[Hypothesis<'_>], winner: usize) 
     let best = &pool[winner];
     let kind = search.setting.noise;
     // What varies around a set, which members of one course share.
-    let mut heard: BTreeMap<usize, Option<Varying>> = BTreeMap::new();
+    let mut heard: BTreeMap<usize, Option<LikelyVariation>> = BTreeMap::new();
     let of = |member: usize| {
         if best.effects[member].mechanism.family != Family::TimeVariation {
             return None;

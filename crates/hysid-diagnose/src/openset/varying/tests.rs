@@ -10,7 +10,7 @@ use super::*;
 use crate::data::DataSet;
 use crate::model::base::{Start, fit_simulation};
 use crate::model::{Model, Values};
-use crate::openset::factor::Varied;
+use crate::openset::varying::written::WrittenVariation;
 pub use crate::oscillator::BASELINE;
 use crate::oscillator::{PERIOD, REAL, drive, normal, respond, rms};
 use crate::refit::LmOptions;
@@ -44,7 +44,7 @@ fn fitted(data: &DataSet) -> Base<'_> {
     fit_simulation(model, Start::Values(&start), &[], None, 2, options, NoiseKind::Coloured).unwrap()
 }
 
-fn found(data: &DataSet) -> Varying {
+fn found(data: &DataSet) -> LikelyVariation {
     let base = fitted(data);
     let plain = data.layout.fit_noise(&base.fit.residual, 0, &[]);
     varying(&base, NoiseKind::Coloured, &[base.whitener.clone(), plain]).swap_remove(0)
@@ -104,7 +104,7 @@ fn the_response_of_a_course_is_the_derivative_of_what_is_written() {
     let data = recorded(3, |t| 1.0 + 0.02 * (TAU * 0.73 * t).sin(), 0.02);
     let v = found(&data);
     let base = fitted(&data);
-    let written = Varied::new(&base.document(), &v).unwrap().forms.swap_remove(0).simulation;
+    let written = WrittenVariation::new(&base.document(), &v).unwrap().forms.swap_remove(0).simulation;
     let names: Vec<String> = written.parameters.iter().map(|p| p.name.clone()).filter(|n| n.starts_with('g')).collect();
     assert_eq!(names.len(), 2);
     for (name, column) in names.iter().zip(&v.columns) {

@@ -6,9 +6,9 @@ use hysid_plant::{Expr, Function, Parameter, Simulation};
 
 use super::course::{Course, phases};
 use super::modulation::multiply;
-use super::varying::{Variation, Varying};
-use super::written::REACH;
+use super::{LikelyVariation, Variation};
 use crate::model::Values;
+use crate::openset::written::REACH;
 
 /// Share of a cycle over the recording by which a frequency may move from where the periodogram found it.
 const CYCLES: f64 = 0.75;
@@ -24,7 +24,7 @@ enum Factor {
 
 /// A parameter that varies, as it can be written.
 #[derive(Debug, Clone)]
-pub struct Varied {
+pub struct WrittenVariation {
     what: Variation,
     /// Share of the residual's power that each of its courses explains on the tangent.
     err: Vec<f64>,
@@ -43,9 +43,9 @@ pub struct Form {
     amplitudes: Vec<String>,
 }
 
-impl Varied {
+impl WrittenVariation {
     /// With amplitudes and frequency unknown; `None` for a walk, since another recording sees another one.
-    pub fn new(simulation: &Simulation, found: &Varying) -> Option<Self> {
+    pub fn new(simulation: &Simulation, found: &LikelyVariation) -> Option<Self> {
         let factors: &[Factor] = match &found.what.course {
             Course::Walk(_) => &[],
             Course::Line(_) => &[Factor::Sum],
@@ -69,7 +69,7 @@ impl Varied {
 }
 
 impl Form {
-    fn new(simulation: &Simulation, found: &Varying, factor: Factor) -> Option<Self> {
+    fn new(simulation: &Simulation, found: &LikelyVariation, factor: Factor) -> Option<Self> {
         let mut written = simulation.clone();
         let (frequency, texts) = match &found.what.course {
             Course::Line(f) => {
