@@ -190,6 +190,11 @@ pub struct Setting<'d> {
 }
 
 impl<'d> Setting<'d> {
+    /// The same by plain squares, each row of which counts for this share of one.
+    pub fn in_plain_squares(&self, share: f64) -> Self {
+        Self { noise: NoiseKind::White(share), ..self.clone() }
+    }
+
     /// Fits a document from values; the noise model is that given, then its own.
     pub fn fit(
         &self,

@@ -1,4 +1,4 @@
-//! The shapes of generic terms: curves, knees, plays and relays of one coordinate, coefficients that change in time, and products of a function of the
+//! The shapes of generic terms: curves, knees and plays of one coordinate, coefficients that change in time, and products of a function of the
 //! displacement with one of the velocity. What lags and delays make of a coordinate: [`super::past`].
 
 use std::f64::consts::TAU;
@@ -59,9 +59,6 @@ const CYCLES: [f64; 5] = [1.0, 1.41, 2.0, 2.83, 4.0];
 /// Width of a gate over the distance of its knee.
 const GATE: f64 = 0.1;
 
-/// Shares of the samples below the levels between which the gain of an input may change.
-const SHIFTS: [(f64, f64); 4] = [(0.2, 0.5), (0.5, 0.8), (0.2, 0.8), (0.3, 0.7)];
-
 /// A knee, a width or a wave number as it is written: three digits, and more where they would make it one of the numbers that are part of a term's form
 /// ([`FORM`]), which no fit moves.
 pub(super) fn free(x: f64) -> String {
@@ -85,7 +82,7 @@ fn each(x: &[Vec<f64>], f: impl Fn(f64) -> f64) -> Series {
 }
 
 /// A function of two series.
-fn both(a: &[Vec<f64>], b: &[Vec<f64>], f: impl Fn(f64, f64) -> f64) -> Series {
+pub(super) fn both(a: &[Vec<f64>], b: &[Vec<f64>], f: impl Fn(f64, f64) -> f64) -> Series {
     a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| f(*a, *b)).collect()).collect()
 }
 
@@ -146,30 +143,8 @@ pub fn curves(name: &str, x: &[Vec<f64>], velocity: bool) -> Vec<Shape> {
 }
 
 /// Half widths of the plays of a coordinate, and distances at which its relays switch.
-fn widths(x: &[Vec<f64>]) -> impl Iterator<Item = f64> {
+pub(super) fn widths(x: &[Vec<f64>]) -> impl Iterator<Item = f64> {
     quantiles(x, WIDTHS).into_iter().map(|q| WIDTH * q).filter(|r| *r > 0.0)
-}
-
-/// Relays of a coordinate of the plant: a force that switches. No sensor does.
-pub fn relays(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
-    let of = |r: f64| {
-        let n = free(r);
-        Shape::new(format!("relay({name}, -{n}, {n})"), Kind::Play, switched(x, -r, r))
-    };
-    widths(x).map(of).collect()
-}
-
-/// A relay of a coordinate, as the operator has it: at rest it is down.
-fn switched(x: &[Vec<f64>], lower: f64, upper: f64) -> Series {
-    let switch = |up: &mut f64, v: f64| {
-        if v > upper {
-            *up = 1.0;
-        } else if v < lower {
-            *up = -1.0;
-        }
-        *up
-    };
-    in_turn(x, |_| -1.0, switch)
 }
 
 /// A coordinate with a coefficient that drifts, and one that changes during a part of the recording.
@@ -201,18 +176,6 @@ pub fn driven((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -
         Shape::new(format!("{u}*{name}^2"), Kind::Odd, both(input, x, |u, x| u * x * x)),
         Shape::new(format!("{u}*abs({name})"), Kind::Odd, both(input, x, |u, x| u * x.abs())),
     ]
-}
-
-/// An input whose gain changes as a coordinate rises beyond one level and changes back below another, as that of a motor behind a gear that shifts.
-pub fn gears((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) -> Vec<Shape> {
-    let all = sorted(x, |v| v);
-    let shifts = |(low, high): (f64, f64)| {
-        let (lower, upper) = (quantile(&all, low)?, quantile(&all, high)?);
-        let text = format!("{u}*relay({name}, {}, {})", free(lower), free(upper));
-        let of_gear = || both(input, &switched(x, lower, upper), |u, gear| u * gear);
-        (upper > lower).then(|| Shape::new(text, Kind::Play, of_gear()))
-    };
-    SHIFTS.into_iter().filter_map(shifts).collect()
 }
 
 /// What is beyond limits on either side, at a few places.
@@ -348,18 +311,6 @@ fn spread(x: &[Vec<f64>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_gain_shifts_up_at_one_level_and_down_at_another() {
-        let up_and_down: Vec<f64> = (0..=100).chain((0..100).rev()).map(f64::from).collect();
-        let input = vec![vec![2.0; up_and_down.len()]];
-        let gear = gears(("u", &input), ("w", &[up_and_down])).swap_remove(2);
-        assert_eq!(gear.text, "u*relay(w, 20, 80)");
-        let high: Vec<usize> = (0..201).filter(|&n| gear.series[0][n] > 0.0).collect();
-        assert!(high.iter().copied().eq(81..=180) && gear.series[0].iter().all(|g| g.abs() == 2.0), "{high:?}");
-        // What stands still shifts nothing.
-        assert!(gears(("u", &input), ("w", &[vec![1.0; 201]])).is_empty());
-    }
 
     #[test]
     fn a_limit_is_told_as_it_is_written() {

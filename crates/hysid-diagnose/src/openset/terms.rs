@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::past;
 use super::shapes::{self, Kind, Shape};
 use super::sites::{Site, Symbol, sites};
+use super::switches;
 use super::varying::course::Series;
 use crate::model::along;
 use crate::model::base::Base;
@@ -134,14 +135,14 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
             found.extend(shapes::curves(name, x, *velocity));
             if plant {
                 if !velocity {
-                    found.extend(shapes::relays(name, x));
+                    found.extend(switches::relays(name, x));
                 }
                 found.extend(past::lags(name, x, data));
                 found.extend(shapes::changes(name, x, data));
             }
             for (u, input) in &inputs {
                 found.extend(shapes::driven((u, input), (name, x)));
-                found.extend(shapes::gears((u, input), (name, x)));
+                found.extend(switches::gears((u, input), (name, x)));
             }
         }
         if let ([a, b], [x, v], true) = (&site.own[..], &series[..own], plant) {

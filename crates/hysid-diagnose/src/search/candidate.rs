@@ -76,3 +76,14 @@ pub enum Columns {
     /// Each candidate is judged by its own and forgets them.
     Dropped,
 }
+
+/// Puts what was found another way among candidates: what is there already is fitted from where that way points first.
+pub fn include(candidates: &mut Vec<Candidate>, others: Vec<Candidate>) {
+    for mut c in others {
+        if let Some(place) = candidates.iter().position(|known| known.key() == c.key()) {
+            c.points.extend(candidates.swap_remove(place).points);
+        }
+        candidates.push(c);
+    }
+    candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+}

@@ -1,6 +1,6 @@
 //! The search for a set of effects: what could be missing, the test, refit of the likeliest, composition.
 //!
-//! `explore` leads through it. `screen` looks at every mechanism at every slot (`tracked` does so along the recorded motion), `fitting` takes the likeliest
+//! `explore` leads through it. `screen` looks at every mechanism at every slot (`tracked` does so along the recorded motion, `pressed` beside parameters that stand at a bound), `fitting` takes the likeliest
 //! from their starts to their finish, `compose` puts effects together, `second_look` asks again where surrogates see nothing. What all of them share is
 //! the fitted set and the setting of its fits (`hypothesis`), and the time (`budget`).
 
@@ -20,6 +20,7 @@ pub mod numerics_check;
 pub mod parted;
 pub mod peaks;
 pub mod prediction;
+pub mod pressed;
 pub mod profile;
 pub mod rehearsal;
 pub mod ripple;
@@ -42,7 +43,7 @@ use crate::evidence::{
     Contender, FeatureGroup, NoiseModel, Projector, SurrogateTest, TestOptions, doubly, surrogate_test,
 };
 use crate::mechanism::{Family, Mechanism, SLOW};
-use crate::model::base::{Base, NoiseKind};
+use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Key, Setting};
 use crate::openset::{ODDS_AGAINST_MORE, OpenSet, correction};
 use crate::request::{Hooks, Options, Question};
@@ -86,6 +87,14 @@ pub struct Search<'a, 'd> {
     open: Mutex<BTreeMap<Key, Option<OpenSet>>>,
 }
 
+impl Setting<'_> {
+    /// Adds what promises most around a hypothesis along the recorded motion, and where parameters at a bound stay there.
+    fn include_further(&self, candidates: &mut Vec<Candidate>, h: &Hypothesis<'_>) {
+        candidate::include(candidates, tracked::along_the_recording(self, h));
+        candidate::include(candidates, pressed::within_bounds(self, h));
+    }
+}
+
 impl<'a, 'd> Search<'a, 'd> {
     /// A search that has found nothing yet.
     pub fn new(setting: Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
@@ -97,7 +106,8 @@ impl<'a, 'd> Search<'a, 'd> {
     pub fn start(&self, none: &Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)> {
         let base = self.setting.further(&none.base, None, 2, 25)?;
         let start = self.setting.hypothesis(Vec::new(), base);
-        let candidates = self.setting.lacking(&start, &start.base.evidence(), Columns::Kept);
+        let mut candidates = self.setting.lacking(&start, &start.base.evidence(), Columns::Kept);
+        self.setting.include_further(&mut candidates, &start);
         Some((start, candidates))
     }
 
@@ -255,7 +265,7 @@ impl<'a, 'd> Search<'a, 'd> {
         if columns == Columns::Dropped {
             found.iter_mut().for_each(Candidate::drop_columns);
         }
-        tracked::include(&mut found, tracked::along_the_recording(&self.setting, h));
+        self.setting.include_further(&mut found, h);
         found
     }
 
@@ -264,7 +274,7 @@ impl<'a, 'd> Search<'a, 'd> {
         if h.base.whitener.is_white() || self.setting.budget.omits(Step::OtherNoise) {
             return None;
         }
-        let plain = Setting { noise: NoiseKind::White(1.0), ..self.setting.clone() };
+        let plain = self.setting.in_plain_squares(1.0);
         let base = plain.further(&h.base, None, 1, PLAIN_ITERATIONS)?;
         Some(plain.hypothesis(h.effects.clone(), base))
     }
@@ -330,6 +340,7 @@ mod tests {
 
     use super::*;
     use crate::budget::Budget;
+    use crate::model::base::NoiseKind;
     use crate::model::hypothesis::{calibrated, recorded};
     use crate::oscillator::{BASELINE, PERIOD, REAL, drive, normal, respond, rms};
 

@@ -52,17 +52,6 @@ pub fn along_the_recording(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Can
     found.into_iter().take_while(|c| c.score() > SCORE).take(MOST).collect()
 }
 
-/// Puts what was found along the recorded motion among the candidates: what is there already is fitted from there first.
-pub fn include(candidates: &mut Vec<Candidate>, tracked: Vec<Candidate>) {
-    for mut c in tracked {
-        if let Some(place) = candidates.iter().position(|known| known.key() == c.key()) {
-            c.points.extend(candidates.swap_remove(place).points);
-        }
-        candidates.push(c);
-    }
-    candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
-}
-
 /// What a sensor shows of the state that a force moves.
 #[derive(Clone, Copy)]
 enum Seen {
