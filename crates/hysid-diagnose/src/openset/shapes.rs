@@ -219,7 +219,8 @@ pub fn product((a, x): (&str, &[Vec<f64>]), (b, y): (&str, &[Vec<f64>])) -> Shap
 type Named<'s> = (&'s str, &'s [Vec<f64>]);
 
 /// What a linkage puts on a part that stands at `x` (where it has a coordinate) and moves with `v`, of another that stands and moves so: centrifugal and
-/// Coriolis forces to first order of the coordinates (products of these and two velocities), and inertia that grows with how the other stands.
+/// Coriolis forces to first order of the coordinates (products of these and two velocities), and inertia and stiffness that grow with how far the other stands
+/// out.
 pub fn linked(
     (x, v): (Option<Named<'_>>, Named<'_>),
     (place, rate): (Named<'_>, Named<'_>),
@@ -232,6 +233,7 @@ pub fn linked(
     let levers = x.into_iter().chain([place]);
     let mut out: Vec<Shape> = levers.flat_map(|lever| [cubic(lever, v, rate), cubic(lever, rate, rate)]).collect();
     out.push(cubic(place, v, v));
+    out.extend(x.map(|x| cubic(x, place, place)));
     let Shape { text, series, .. } = product(place, place);
     out.push(Shape::new(format!("{text}*{}", acceleration.0), Kind::Odd, both(&series, acceleration.1, |a, b| a * b)));
     out
@@ -321,6 +323,26 @@ mod tests {
         let faster = told_rate(&one_way_faster(("rate_fin", &rate)).text);
         assert_eq!(faster.as_deref(), Some("`fin` rises at another rate than it falls"));
         assert_eq!(told_rate("fin^2"), None);
+    }
+
+    #[test]
+    fn a_linkage_pulls_and_stiffens_with_what_stands_and_moves_elsewhere() {
+        let [x, v, place, rate, acceleration] = [2.0, 3.0, 5.0, 7.0, 11.0].map(|value| [vec![value]]);
+        let of = |x| linked((x, ("v", &v)), (("y", &place), ("w", &rate)), ("acc", &acceleration));
+        let told = |s: Shape| (s.text, s.series[0][0]);
+        let own: Vec<(String, f64)> = of(Some(("x", &x))).into_iter().map(told).collect();
+        let terms = [
+            ("x*v*w", 42.0),
+            ("x*w^2", 98.0),
+            ("y*v*w", 105.0),
+            ("y*w^2", 245.0),
+            ("y*v^2", 45.0),
+            ("x*y^2", 50.0),
+            ("y^2*acc", 275.0),
+        ];
+        assert_eq!(own, terms.map(|(text, value)| (text.to_owned(), value)));
+        // Without a coordinate of its own nothing has one for a lever.
+        assert!(of(None).into_iter().all(|s| !s.text.contains('x')));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hysid_plant::{Expr, Output, Simulation, Slot as Place};
 
-use crate::slot::{OWN_VELOCITY, Place as Slotted, Slot, Structure, is_place, is_turn};
+use crate::slot::{Place as Slotted, Quantity, Slot, Structure, is_place, is_turn};
 
 /// A signal that terms are written over.
 #[derive(Debug, Clone)]
@@ -133,9 +133,15 @@ fn of_state(simulation: &Simulation, structure: &Structure, i: usize) -> Site {
     let moves_by_itself = own.iter().all(|s| s.name == state.name) && !matches!(state.derivative, Expr::Symbol(_));
     let rate = moves_by_itself.then(|| Symbol::new(&format!("rate_{}", state.name), state.derivative.clone()));
     let place = |name: &str| others.iter().position(|o| o.name == name);
-    let velocity = |coordinate: &Symbol| match &simulation.state(&coordinate.name)?.derivative {
-        Expr::Symbol(v) => place(v),
-        _ => None,
+    let velocity = |coordinate: &Symbol| {
+        let of_coordinate = |s: &&Slot| {
+            let itself = s.coordinate().and_then(|x| s.quantity(x)).is_some_and(|q| q.expression == coordinate.meaning);
+            s.place == Slotted::Force && itself
+        };
+        match &structure.slots.iter().find(of_coordinate)?.own_velocity()?.expression {
+            Expr::Symbol(v) => place(v),
+            _ => None,
+        }
     };
     let parts: Vec<(usize, usize)> = (0..others.len()).filter_map(|x| Some((x, velocity(&others[x])?))).collect();
     let moves = own.iter().any(|s| s.velocity) && !parts.is_empty();
@@ -156,19 +162,19 @@ fn led(simulation: &Simulation) -> Vec<Symbol> {
 /// The speeds and angles of what turns without a part in a slot's own coordinates, as a rotor in a machine that stands on springs.
 fn turning(structure: &Structure, own: &[Symbol]) -> Vec<[Symbol; 2]> {
     let of_slot = |slot: &Slot| {
-        let elsewhere = |n: &str| match &slot.quantity(n)?.expression {
-            Expr::Symbol(name) if own.iter().all(|s| !s.meaning.uses(name)) => Some(name),
+        let elsewhere = |quantity: &Quantity| match &quantity.expression {
+            Expr::Symbol(name) if own.iter().all(|s| !s.meaning.uses(name)) => Some(name.clone()),
             _ => None,
         };
-        let speed = elsewhere(if slot.has(OWN_VELOCITY) { OWN_VELOCITY } else { "v" })?;
-        let name = format!("{}_rad", elsewhere(slot.coordinate()?)?);
+        let speed = elsewhere(slot.own_velocity()?)?;
+        let name = format!("{}_rad", elsewhere(slot.quantity(slot.coordinate()?)?)?);
         let text = Expr::parse(slot.angle()?).ok()?;
         let meant = |e: Expr, n: &String| match slot.quantity(n) {
             Some(quantity) => e.substitute(n, &quantity.expression),
             None => e,
         };
         let angle = text.symbols().iter().fold(text, meant).simplified();
-        Some([Symbol::itself(speed), Symbol::new(&name, angle)])
+        Some([Symbol::itself(&speed), Symbol::new(&name, angle)])
     };
     structure.slots.iter().filter(|s| s.place == Slotted::Force).filter_map(of_slot).collect()
 }
@@ -226,5 +232,23 @@ mod tests {
         assert_eq!(led_at("a = \"trolley_m_s2\"\nl = \"rope_m\""), ["d(l)"]);
         assert!(led_at("a = \"trolley_m_s2\"\nl = \"load_kg\"").is_empty(), "no place");
         assert!(led_at("l = \"rope_m\"").is_empty(), "what drives it is there already");
+    }
+
+    #[test]
+    fn a_part_elsewhere_has_its_coordinate_and_its_velocity_whatever_their_units() {
+        let parts = |rate: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 1e-4\n[inputs]\nu = \"drive_V\"\n[parameters]\nk = {{ value = 9.0, min = 0.1 }}\n[states]\n\
+                 x = {{ derivative = \"{rate}\", initial = 0.0 }}\nwx = {{ derivative = \"u - k*x - wx\", initial = 0.0 }}\n\
+                 y = {{ derivative = \"wy*1000\", initial = 0.0 }}\nwy = {{ derivative = \"u - 2*k*y - wy\", initial = 0.0 }}\n[outputs]\ntip = \"x\"\ntilt = \"y\"\n"
+            );
+            let simulation = Simulation::parse(&text, "mirror.sim.toml").unwrap();
+            let sites = sites(&simulation, &Structure::of(&simulation));
+            let site = sites.into_iter().find(|s| s.slot == "state:wy").unwrap();
+            site.parts.iter().map(|(x, v)| [*x, *v].map(|i| site.others[i].name.clone())).collect::<Vec<_>>()
+        };
+        for rate in ["wx", "1000*wx"] {
+            assert_eq!(parts(rate), [["x", "wx"]], "{rate}");
+        }
     }
 }

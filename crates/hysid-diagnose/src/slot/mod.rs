@@ -195,6 +195,11 @@ impl Slot {
         ["x", "turn"].into_iter().find(|x| self.has(x))
     }
 
+    /// The velocity as the simulation has it, which the rate of the coordinate may be a multiple of.
+    pub(crate) fn own_velocity(&self) -> Option<&Quantity> {
+        self.quantity(if self.has(OWN_VELOCITY) { OWN_VELOCITY } else { "v" })
+    }
+
     /// The angle in radians, as text, where the coordinate is one.
     pub(crate) fn angle(&self) -> Option<&'static str> {
         match self.coordinate()? {
