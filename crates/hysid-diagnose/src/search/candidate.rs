@@ -77,6 +77,15 @@ pub enum Columns {
     Dropped,
 }
 
+/// Most candidates that are taken of those which were found another way, and the score from which one is.
+const MOST_FURTHER: usize = 6;
+const SCORE_OF_FURTHER: f64 = 25.0;
+
+/// What promises most of candidates that were found another way, best score first.
+pub fn promising(found: Vec<Candidate>) -> Vec<Candidate> {
+    found.into_iter().take_while(|c| c.score() > SCORE_OF_FURTHER).take(MOST_FURTHER).collect()
+}
+
 /// Puts what was found another way among candidates: what is there already is fitted from where that way points first.
 pub fn include(candidates: &mut Vec<Candidate>, others: Vec<Candidate>) {
     for mut c in others {

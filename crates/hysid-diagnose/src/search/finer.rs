@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::assemble::{Part, assemble};
 use super::finish::finish;
-use super::fitting::HOPELESS;
+use super::given_up::HOPELESS;
 use super::screen::rewrite_at;
 use crate::budget::Step;
 use crate::mechanism::{Form, Law, Purpose, Role};

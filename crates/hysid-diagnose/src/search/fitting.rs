@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::candidate::Candidate;
 use super::finer::finer;
 use super::finish::{finish, likelier};
+use super::given_up::HOPELESS;
 use super::screen::with_added_starts;
 use super::starts::{is_in_a_loop, set, starting_values, starts, strength_in_shapes};
 use crate::budget::Step;
@@ -145,8 +146,6 @@ fn hypothesis<'d>(
 
 /// Candidates of a list that are fitted to the end.
 const MOST_COMPLETE: usize = 8;
-/// Log evidence by which a candidate may trail after a few iterations, and later after each stage of its fit, and still be refitted to the end.
-pub const HOPELESS: f64 = 40.0;
 
 /// Shapes from which on a few iterations tell little of a law: between the points of its grid its likelihood is bent. It goes on by as many as long as each time
 /// takes it this share of the way to what it trails.

@@ -1,7 +1,9 @@
-//! Sets that explain nothing: whose noise model calls noise what others explain.
+//! What is given up: sets that trail too far to be fitted to the end, and sets that explain nothing, whose noise model calls noise what others explain.
 
 use crate::model::hypothesis::Hypothesis;
 
+/// Log evidence by which a candidate may trail after a few iterations, and later after each stage of its fit, and still be refitted to the end.
+pub const HOPELESS: f64 = 40.0;
 /// Plain error, over that of a set of no more effects, at which a set under a noise model takes mismatch for noise.
 const GIVEN_UP: f64 = 1.5;
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::assemble::{Part, assemble, complete};
 use super::candidate::Candidate;
 use super::compose::best_of_size;
-use super::fitting::HOPELESS;
+use super::given_up::HOPELESS;
 use crate::budget::Step;
 use crate::mechanism::{Block, Family};
 use crate::model::hypothesis::{Hypothesis, Setting};

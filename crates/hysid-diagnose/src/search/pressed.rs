@@ -7,22 +7,18 @@
 //! These scores hold what another bound would explain, and take part in no test. They say what is fitted, and where from; the fits, which keep the
 //! bounds, decide.
 
-use super::candidate::{Candidate, Columns};
+use super::candidate::{Candidate, Columns, promising};
 use crate::evidence::{Projector, norm2, score};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// Score of the tangents of parameters at a bound from which they are pressed against it.
 const PRESSED: f64 = 10.0;
-/// Most candidates, and the score from which one is taken.
-const MOST: usize = 6;
-const SCORE: f64 = 25.0;
 
 /// What could be missing around a hypothesis and promises most where parameters at a bound stay there; none where no parameter is pressed against one.
 pub fn within_bounds(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Candidate> {
     let Some(evidence) = off_what_moves(&h.base) else { return Vec::new() };
-    let found = setting.lacking(h, &evidence, Columns::Dropped);
-    found.into_iter().take_while(|c| c.score() > SCORE).take(MOST).collect()
+    promising(setting.lacking(h, &evidence, Columns::Dropped))
 }
 
 /// The evidence off the tangents of the parameters that stand at no bound; `None` where the others could explain nothing.

@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::compose::best_of_size;
-use super::fitting::HOPELESS;
+use super::given_up::HOPELESS;
 use crate::mechanism::Mechanism;
 use crate::model::hypothesis::{Effect, Hypothesis, Key};
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::assemble::{Part, assemble, complete};
 use super::compose::add;
 use super::finer::inherited;
-use super::fitting::HOPELESS;
+use super::given_up::HOPELESS;
 use crate::budget::Step;
 use crate::mechanism::{Mechanism, Purpose, mechanism};
 use crate::model::hypothesis::{Hypothesis, Setting};

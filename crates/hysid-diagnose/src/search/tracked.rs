@@ -11,7 +11,7 @@
 
 use hysid_plant::{Expr, Hold, Input, Simulation};
 
-use super::candidate::{Candidate, Columns};
+use super::candidate::{Candidate, Columns, promising};
 use super::screen::{Along, screen_along};
 use crate::data::{DataSet, Stretch};
 use crate::mechanism::Mechanism;
@@ -30,9 +30,6 @@ const NEARER: f64 = 0.5;
 /// Iterations of the fit along the recorded motion, and instants at which its equations are linearised.
 const ITERATIONS: usize = 5;
 const INSTANTS: usize = 8;
-/// Most candidates, and the score from which one is taken.
-const MOST: usize = 6;
-const SCORE: f64 = 25.0;
 
 /// What could be missing around a hypothesis and promises most along the recorded motion, with the points of their grids there; none where the residual
 /// is not that of an unknown force, or no observer brings the simulation to the recording.
@@ -48,8 +45,7 @@ pub fn along_the_recording(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Can
     let along = Along { motion: &motion, bring: &bring };
     // What a sensor does to a motion is seen in the noise that the observer follows.
     let moves = |_: &Mechanism, slot: &Slot| matches!(slot.target, Target::Derivatives(_));
-    let found = screen_along(base, along, &setting.original, &h.effects, &motion.evidence(), &moves, Columns::Dropped);
-    found.into_iter().take_while(|c| c.score() > SCORE).take(MOST).collect()
+    promising(screen_along(base, along, &setting.original, &h.effects, &motion.evidence(), &moves, Columns::Dropped))
 }
 
 /// What a sensor shows of the state that a force moves.
