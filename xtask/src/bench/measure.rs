@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::Context;
-use hysid_bench::timing::load;
+use hysid_bench::timing::{load, read_doubles};
 use hysid_concealed::bank;
 use hysid_concealed::case::Group;
 use hysid_concealed::seed::Stream;
@@ -237,7 +237,7 @@ impl Place<'_> {
 
     /// Differences of the outputs from that of the contender over which each is put, where there are outputs.
     fn compare(&self, outcomes: &mut [Outcome]) {
-        let read = |i: usize| std::fs::read(self.folder().join(format!("out-{i}.f64"))).ok().map(|b| doubles(&b));
+        let read = |i: usize| read_doubles(&self.folder().join(format!("out-{i}.f64"))).ok();
         for i in 0..outcomes.len() {
             let Some(own) = outcomes.iter().position(|o| o.contender.tool == outcomes[i].contender.over) else {
                 continue;
@@ -258,11 +258,6 @@ fn difference(ours: &[f64], other: &[f64]) -> Option<f64> {
     let largest = ours.iter().zip(other).map(|(a, _)| a.abs()).reduce(f64::max)?;
     let apart = ours.iter().zip(other).map(|(a, b)| (a - b).abs()).reduce(f64::max)?;
     Some(apart / largest)
-}
-
-/// Little-endian doubles.
-fn doubles(bytes: &[u8]) -> Vec<f64> {
-    bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
 }
 
 /// A Python with the other tools' packages, installed where they are not.
@@ -367,6 +362,5 @@ mod tests {
     fn outputs_are_compared_over_the_samples_that_both_have() {
         assert_eq!(difference(&[1.0, -2.0, 9.0], &[1.0, -1.0]), Some(0.5));
         assert_eq!(difference(&[1.0], &[]), None);
-        assert_eq!(doubles(&1.5f64.to_le_bytes()), [1.5]);
     }
 }
