@@ -117,6 +117,13 @@ impl Hypothesis<'_> {
         all
     }
 
+    /// The mechanisms of its effects, sorted.
+    pub fn mechanisms(&self) -> Vec<&'static str> {
+        let mut all: Vec<&str> = self.effects.iter().map(|e| e.mechanism.id).collect();
+        all.sort_unstable();
+        all
+    }
+
     /// The families of its effects, sorted.
     pub fn families(&self) -> Vec<&'static str> {
         let mut all: Vec<&str> = self.effects.iter().map(|e| e.mechanism.family.name()).collect();

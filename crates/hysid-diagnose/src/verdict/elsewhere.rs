@@ -1,27 +1,31 @@
-//! Whether an effect may as well act at another place of the same name.
+//! Whether an effect may as well act at another place.
 //!
-//! `diagnosis.json` calls a place by the equation that it stands in, and a spring to the ground and one to the next mass have one name. A set that differs
-//! from the one that is told in nothing but that is no rival by name, and says something else of the machine.
+//! A set that differs from the one that is told in nothing but where its mechanisms act is no rival of a mechanism's name, and says something else of the
+//! machine: a stiffness that jumps where an output alone has it, or the gain of that sensor. `diagnosis.json` calls a place by the equation that it stands
+//! in, and a spring to the ground and one to the next mass have one name: those are told by where they act.
 
 use crate::model::hypothesis::{Effect, Hypothesis};
 
 /// Log evidence within which two sets are as likely.
 const TIE: f64 = 3.0;
 
-/// The places at which effects of a set may act as well, by their names, in words.
+/// The places at which effects of a set may act as well, in words.
 pub fn elsewhere(pool: &[Hypothesis<'_>], told: usize) -> Vec<String> {
     let best = &pool[told];
     let mut out = Vec::new();
-    let likely = |h: &&Hypothesis<'_>| h.log_evidence > best.log_evidence - TIE && h.names() == best.names();
+    let likely = |h: &&Hypothesis<'_>| h.log_evidence > best.log_evidence - TIE && h.mechanisms() == best.mechanisms();
     for other in pool.iter().filter(likely) {
         for e in best.effects.iter().filter(|e| !holds(other, e)) {
-            let instead = other.effects.iter().find(|o| o.states_the_same(e) && !holds(best, o));
-            out.extend(instead.map(|o| {
+            let mut there = other.effects.iter().filter(|o| o.mechanism.id == e.mechanism.id && !holds(best, o));
+            let of_one_name = other.effects.iter().find(|o| o.states_the_same(e) && !holds(best, o));
+            out.extend(of_one_name.or_else(|| there.next()).map(|o| {
+                let (id, label) = (e.mechanism.id, &e.slot.label);
                 let (here, there) = (&e.slot.whereabouts, &o.slot.whereabouts);
-                format!(
-                    "whether {} at {} acts {here} or {there} this recording does not tell",
-                    e.mechanism.id, e.slot.label
-                )
+                if o.slot.label == *label {
+                    format!("whether {id} at {label} acts {here} or {there} this recording does not tell")
+                } else {
+                    format!("whether {id} is at {label} or at {} this recording does not tell", o.slot.label)
+                }
             }));
         }
     }
@@ -53,7 +57,21 @@ mod tests {
             for (behind, expected) in [(1.0, 1), (9.0, 0)] {
                 sets[other].log_evidence = sets[one].log_evidence - behind;
                 let told = elsewhere(&sets, one);
+                let told: Vec<&String> = told.iter().filter(|t| t.contains(" acts ")).collect();
                 assert!(told.len() == expected && told.iter().all(|t| t.contains(&both)), "{told:?} {both}");
+            }
+        });
+    }
+
+    #[test]
+    fn so_are_places_of_other_names() {
+        with_springs_of_two_masses(|_, mut sets| {
+            sets[1].effects[0].slot.label = "parameter:k".into();
+            let both = format!("at {} or at parameter:k", sets[0].effects[0].slot.label);
+            for (behind, expected) in [(1.0, true), (9.0, false)] {
+                sets[1].log_evidence = sets[0].log_evidence - behind;
+                let told = elsewhere(&sets, 0);
+                assert_eq!(told.iter().any(|t| t.contains(&both)), expected, "{told:?} {both}");
             }
         });
     }

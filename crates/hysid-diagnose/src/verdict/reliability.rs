@@ -49,6 +49,12 @@ impl Map {
     }
 }
 
+/// By how much more rivals have where a statement has this probability in the place of its support. One that stays as it is gives nothing up, however little
+/// it leaves.
+fn left_to_rivals(probability: f64, support: f64) -> f64 {
+    if probability == support { 1.0 } else { (1.0 - probability) / (1.0 - support) }
+}
+
 /// Puts probabilities in the place of supports, in effects and alternatives. The verdict stands as it is.
 pub(crate) fn recalibrate(file: &mut DiagnosisFile) {
     let members = file.effects.len();
@@ -61,7 +67,7 @@ pub(crate) fn recalibrate(file: &mut DiagnosisFile) {
     for e in &mut file.effects {
         e.probability = of(MECHANISM, e.support);
         e.family_probability = of(FAMILY, e.family_support).max(e.probability);
-        rivals = rivals.min((1.0 - e.probability) / (1.0 - e.support).max(f64::MIN_POSITIVE));
+        rivals = rivals.min(left_to_rivals(e.probability, e.support));
     }
     if !rivals.is_finite() {
         return;
@@ -107,9 +113,16 @@ mod tests {
             let support = if capped { raw.min(NOT_FIRM) } else { raw };
             let whole: f64 = shares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
             let p = MECHANISM.probability(support, 1);
-            let factor = (1.0 - p) / (1.0 - support).max(f64::MIN_POSITIVE);
+            let factor = left_to_rivals(p, support);
             let rivals: f64 = shares.iter().map(|s| (1.0 - raw) * s / whole * factor).sum();
             prop_assert!(p + rivals <= 1.0 + 1e-12);
         }
+    }
+
+    /// Rivals of what is certain are as likely as they were: a mechanism that is at one of two places is certain, and neither place is.
+    #[test]
+    fn what_is_certain_takes_nothing_from_others() {
+        assert_eq!(left_to_rivals(1.0, 1.0), 1.0);
+        assert_eq!(left_to_rivals(0.5, 0.8), 0.5 / (1.0 - 0.8));
     }
 }
