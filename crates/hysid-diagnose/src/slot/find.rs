@@ -100,6 +100,11 @@ impl Finder<'_> {
     pub(super) fn kinematic_input(&self, symbol: &str) -> Kinematic {
         let unit = self.simulation.unit_of(symbol);
         match kinematic(unit.as_ref(), symbol) {
+            Kinematic::Neither
+                if unit.as_ref().is_none_or(|u| is_one_of(u, &["percent"])) && self.is_strained(symbol) =>
+            {
+                Kinematic::Displacement
+            }
             Kinematic::Neither if self.is_pressure_law() => match unit {
                 Some(u) if is_one_of(&u, &["m3/s"]) => Kinematic::Velocity,
                 Some(u) if is_one_of(&u, &["m3"]) => Kinematic::Displacement,
@@ -107,6 +112,16 @@ impl Finder<'_> {
             },
             kind => kind,
         }
+    }
+
+    /// Whether an input without dimension is the strain of a specimen: forces or stresses are all that is simulated, and its rate is in them.
+    fn is_strained(&self, symbol: &str) -> bool {
+        let presses = |o: &Output| self.unit_of_output(&o.column, &o.expression).is_some_and(|u| presses(&u));
+        let rate = Expr::symbol(symbol).derivative_of_input();
+        let strained = |o: &Output| presses(o) && o.expression.replace(&rate, &Expr::Number(0.0)) != o.expression;
+        self.simulation.is_static()
+            && self.simulation.outputs.iter().all(presses)
+            && self.simulation.outputs.iter().any(strained)
     }
 
     fn is_pressure_law(&self) -> bool {

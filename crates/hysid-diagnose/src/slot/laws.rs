@@ -189,6 +189,27 @@ mod tests {
     }
 
     #[test]
+    fn what_strains_a_specimen_is_a_displacement() {
+        let over = |input: &str, output: &str, law: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.1\n[inputs]\nel = \"{input}\"\n[parameters]\nk = {{ value = 6.0, min = 0.1 }}\nc = {{ value = 0.7, min = 0.1 }}\n[outputs]\n{output} = \"{law}\"\n"
+            );
+            let slots = Structure::of(&Simulation::parse(&text, "wire.sim.toml").unwrap()).slots;
+            let law = slots.into_iter().find(|s| s.place == Place::ForceLaw);
+            law.and_then(|s| Some(["x", "v"].map(|n| s.quantity(n).map(|q| q.expression.to_string()))))
+        };
+        let motion = Some(["el", "d(el)"].map(|text| Some(text.to_owned())));
+        for input in ["strain_pct", "strain_percent"] {
+            assert_eq!(over(input, "pull_N", "k*el + c*d(el)"), motion, "{input}");
+        }
+        assert_eq!(over("strain_pct", "stress_MPa", "k*el + c*d(el)"), motion);
+        // Without a rate it may be the opening of a valve; nor does it strain what is no force, and what is measured in volts strains nothing.
+        assert_eq!(over("opening_pct", "pull_N", "k*el + c"), None);
+        assert_eq!(over("strain_pct", "drop_V", "k*el + c*d(el)"), None);
+        assert_eq!(over("drive_V", "pull_N", "k*el + c*d(el)"), None);
+    }
+
+    #[test]
     fn what_bends_an_output_over_an_input_is_a_curve() {
         let curves = |input: &str, output: &str| {
             let text = format!(
