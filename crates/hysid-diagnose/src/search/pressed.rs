@@ -17,12 +17,12 @@ const PRESSED: f64 = 10.0;
 
 /// What could be missing around a hypothesis and promises most where parameters at a bound stay there; none where no parameter is pressed against one.
 pub fn within_bounds(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Candidate> {
-    let Some(evidence) = off_what_moves(&h.base) else { return Vec::new() };
+    let Some(evidence) = beside_what_moves(&h.base) else { return Vec::new() };
     promising(setting.lacking(h, &evidence, Columns::Dropped))
 }
 
-/// The evidence off the tangents of the parameters that stand at no bound; `None` where the others could explain nothing.
-fn off_what_moves(base: &Base<'_>) -> Option<(Projector, Vec<f64>)> {
+/// The evidence beside the tangents of the parameters that can still move; `None` where those of parameters at a bound would explain no more than chance.
+fn beside_what_moves(base: &Base<'_>) -> Option<(Projector, Vec<f64>)> {
     let layout = &base.model.data().layout;
     let white = |i: usize| base.whitener.apply(layout, &base.fit.jacobian[i]);
     let (at_bound, moving): (Vec<usize>, Vec<usize>) = (0..base.fit.theta.len()).partition(|&i| base.fit.at_bound[i]);
