@@ -196,7 +196,7 @@ mod tests {
             );
             let slots = Structure::of(&Simulation::parse(&text, "wire.sim.toml").unwrap()).slots;
             let law = slots.into_iter().find(|s| s.place == Place::ForceLaw);
-            law.and_then(|s| Some(["x", "v"].map(|n| s.quantity(n).map(|q| q.expression.to_string()))))
+            law.map(|s| ["x", "v"].map(|n| s.quantity(n).map(|q| q.expression.to_string())))
         };
         let motion = Some(["el", "d(el)"].map(|text| Some(text.to_owned())));
         for input in ["strain_pct", "strain_percent"] {
