@@ -15,7 +15,7 @@ mod regress;
 pub mod shapes;
 mod signature;
 mod sites;
-mod switches;
+pub mod switches;
 mod terms;
 pub mod uneven;
 pub mod varying;

@@ -52,6 +52,18 @@ pub fn gears((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) ->
     levels(&sorted(x, |v| v), &SHIFTS).map(of).collect()
 }
 
+/// What a term of [`relays`] or [`gears`] tells, in words.
+pub fn told_switch(term: &str) -> Option<String> {
+    let (input, relay) = term.split_once("relay(")?;
+    let [name, lower, upper] = <[&str; 3]>::try_from(relay.strip_suffix(')')?.split(", ").collect::<Vec<_>>()).ok()?;
+    let what = match input.strip_suffix('*') {
+        Some(u) => format!("the gain of `{u}`"),
+        None if input.is_empty() => "something".to_owned(),
+        None => return None,
+    };
+    Some(format!("{what} switches as `{name}` rises above {upper}, and back as it falls below {lower}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,6 +78,17 @@ mod tests {
         assert!(high.iter().copied().eq(81..=180) && gear.series[0].iter().all(|g| g.abs() == 2.0), "{high:?}");
         // What stands still shifts nothing.
         assert!(gears(("u", &input), ("w", &[vec![1.0; 201]])).is_empty());
+    }
+
+    #[test]
+    fn a_switch_is_told_in_words() {
+        let told = |term| told_switch(term).unwrap_or_default();
+        assert_eq!(
+            told("relay(V, 0.902, 1.81)"),
+            "something switches as `V` rises above 1.81, and back as it falls below 0.902"
+        );
+        assert!(told("u*relay(w, 20, 80)").starts_with("the gain of `u` switches as `w` rises above 80,"));
+        assert!(["V^2", "relay(V, 1)", "sin(2*V)relay(V, 1, 2)"].into_iter().all(|t| told_switch(t).is_none()));
     }
 
     #[test]
