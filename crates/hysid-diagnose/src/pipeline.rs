@@ -23,8 +23,7 @@ use crate::model::base::NoiseKind;
 use crate::model::force::pushed;
 use crate::model::hold::free_run;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
-use crate::openset::shapes::told_rate;
-use crate::openset::switches::told_switch;
+use crate::openset::in_words;
 use crate::request::{Hooks, Request};
 use crate::search::explore::{Explored, LESSONS, explore};
 use crate::search::gentle::take_gentlest;
@@ -160,9 +159,9 @@ pub fn diagnose(request: &Request<'_>, hooks: &Hooks<'_>) -> Result<Diagnosis, D
     file.notes.extend(one_sided(best));
     let unequal = (!unequal.is_empty()).then(|| unequal.join("; "));
     let loudest = file.correction.as_ref().and_then(CorrectionRecord::loudest);
-    let in_words = loudest.and_then(|t| told_rate(&t.term).or_else(|| told_switch(&t.term)));
+    let told = loudest.and_then(|t| in_words(&t.term));
     // What wanders in the place of an effect is not what a correction that is written describes.
-    let varying = in_words.or(varying).or(wanders.filter(|_| modelled.is_none()));
+    let varying = told.or(varying).or(wanders.filter(|_| modelled.is_none()));
     file.summary = summary(&file, varying.as_deref().or(spectrum), unequal.as_deref());
     if let Some(refutation) = refutation(&file.fit, &file.effects) {
         file.summary = format!("{} {refutation}", file.summary);

@@ -239,8 +239,13 @@ impl Base<'_> {
 
     /// The same under another noise.
     pub fn evidence_under(&self, noise: &Whitener) -> (Projector, Vec<f64>) {
+        self.evidence_beside(noise, 0..self.fit.jacobian.len())
+    }
+
+    /// The same off the tangents of these unknowns only (places in `theta`).
+    pub fn evidence_beside(&self, noise: &Whitener, places: impl IntoIterator<Item = usize>) -> (Projector, Vec<f64>) {
         let layout = &self.model.data().layout;
-        let own = Projector::new(self.fit.jacobian.iter().map(|c| noise.apply(layout, c)));
+        let own = Projector::new(places.into_iter().map(|i| noise.apply(layout, &self.fit.jacobian[i])));
         let mut r = noise.apply(layout, &self.fit.residual);
         own.remove(&mut r);
         (own, r)

@@ -112,21 +112,21 @@ impl Hypothesis<'_> {
 
     /// Its effects by name, sorted: mechanisms and labels of slots, which two places may share.
     pub fn names(&self) -> Vec<(&str, &str)> {
-        let mut all: Vec<_> = self.effects.iter().map(|e| (e.mechanism.id, e.slot.label.as_str())).collect();
-        all.sort_unstable();
-        all
+        self.sorted(|e| (e.mechanism.id, e.slot.label.as_str()))
     }
 
     /// The mechanisms of its effects, sorted.
     pub fn mechanisms(&self) -> Vec<&'static str> {
-        let mut all: Vec<&str> = self.effects.iter().map(|e| e.mechanism.id).collect();
-        all.sort_unstable();
-        all
+        self.sorted(|e| e.mechanism.id)
     }
 
     /// The families of its effects, sorted.
     pub fn families(&self) -> Vec<&'static str> {
-        let mut all: Vec<&str> = self.effects.iter().map(|e| e.mechanism.family.name()).collect();
+        self.sorted(|e| e.mechanism.family.name())
+    }
+
+    fn sorted<'h, T: Ord>(&'h self, of: impl Fn(&'h Effect) -> T) -> Vec<T> {
+        let mut all: Vec<T> = self.effects.iter().map(of).collect();
         all.sort_unstable();
         all
     }

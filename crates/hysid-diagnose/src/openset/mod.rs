@@ -12,10 +12,10 @@
 pub mod needed;
 mod past;
 mod regress;
-pub mod shapes;
+mod shapes;
 mod signature;
 mod sites;
-pub mod switches;
+mod switches;
 mod terms;
 pub mod uneven;
 pub mod varying;
@@ -31,14 +31,20 @@ use crate::file::{CorrectionRecord, SignatureRecord, TermRecord};
 use crate::model::Count;
 use crate::model::base::{Base, MAX_AR, NoiseKind, log_likelihood, spared};
 use regress::regress;
-use shapes::Kind;
+use shapes::{Kind, told_rate};
 use signature::signature;
+use switches::told_switch;
 use terms::{Term, terms};
 use varying::course::Course;
 use varying::written::WrittenVariation;
 use varying::{LikelyVariation, Variation, varying};
 use view::View;
 use written::Sparse;
+
+/// What a term tells, in words, where it says more than a formula does.
+pub fn in_words(term: &str) -> Option<String> {
+    told_rate(term).or_else(|| told_switch(term))
+}
 
 /// A correction with what decides whether it is believed.
 #[derive(Debug, Clone)]

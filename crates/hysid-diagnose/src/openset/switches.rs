@@ -1,5 +1,7 @@
 //! What switches: relays of a coordinate, by themselves and as the gain of an input.
 
+use hysid_signal::range;
+
 use super::shapes::{Kind, Shape, both, free, in_turn, sorted, widths};
 use super::varying::course::Series;
 use crate::evidence::quantile;
@@ -17,16 +19,17 @@ pub fn relays(name: &str, x: &[Vec<f64>]) -> Vec<Shape> {
         let text = format!("relay({name}, {}, {})", free(lower), free(upper));
         Shape::new(text, Kind::Play, switched(x, lower, upper))
     };
-    let all = sorted(x, |v| v);
-    if all.first().is_some_and(|low| *low > 0.0) || all.last().is_some_and(|high| *high < 0.0) {
-        return levels(&all, &SWITCHES).map(of).collect();
+    let (low, high) = range(x.iter().flatten().copied());
+    if low > 0.0 || high < 0.0 {
+        return levels(x, &SWITCHES).map(of).collect();
     }
     widths(x).map(|r| of((-r, r))).collect()
 }
 
-/// Pairs of levels at these shares of sorted samples; none that are one.
-fn levels(sorted: &[f64], shares: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
-    let pair = |&(low, high): &(f64, f64)| Some((quantile(sorted, low)?, quantile(sorted, high)?));
+/// Pairs of levels at these shares of a coordinate's samples; none that are one.
+fn levels(x: &[Vec<f64>], shares: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
+    let all = sorted(x, |v| v);
+    let pair = move |&(low, high): &(f64, f64)| Some((quantile(&all, low)?, quantile(&all, high)?));
     shares.iter().filter_map(pair).filter(|(lower, upper)| upper > lower)
 }
 
@@ -49,7 +52,7 @@ pub fn gears((u, input): (&str, &[Vec<f64>]), (name, x): (&str, &[Vec<f64>])) ->
         let text = format!("{u}*relay({name}, {}, {})", free(lower), free(upper));
         Shape::new(text, Kind::Play, both(input, &switched(x, lower, upper), |u, gear| u * gear))
     };
-    levels(&sorted(x, |v| v), &SHIFTS).map(of).collect()
+    levels(x, &SHIFTS).map(of).collect()
 }
 
 /// What a term of [`relays`] or [`gears`] tells, in words.

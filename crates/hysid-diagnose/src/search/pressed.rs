@@ -8,7 +8,7 @@
 //! bounds, decide.
 
 use super::candidate::{Candidate, Columns, promising};
-use crate::evidence::{Projector, norm2, score};
+use crate::evidence::{FeatureGroup, Projector, norm2, score};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Setting};
 
@@ -23,22 +23,14 @@ pub fn within_bounds(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Vec<Candidate
 
 /// The evidence beside the tangents of the parameters that can still move; `None` where those of parameters at a bound would explain no more than chance.
 fn beside_what_moves(base: &Base<'_>) -> Option<(Projector, Vec<f64>)> {
-    let layout = &base.model.data().layout;
-    let white = |i: usize| base.whitener.apply(layout, &base.fit.jacobian[i]);
     let (at_bound, moving): (Vec<usize>, Vec<usize>) = (0..base.fit.theta.len()).partition(|&i| base.fit.at_bound[i]);
     if at_bound.is_empty() {
         return None;
     }
-    let own = Projector::new(moving.into_iter().map(white));
-    let mut r = base.whitener.apply(layout, &base.fit.residual);
-    own.remove(&mut r);
-    let off = at_bound.into_iter().map(|i| {
-        let mut column = white(i);
-        own.remove(&mut column);
-        column
-    });
-    let held = Projector::new(off);
-    let pressed = score(norm2(&r), held.inside(&r), r.len(), held.rank()) > PRESSED;
+    let (own, r) = base.evidence_beside(&base.whitener, moving);
+    let columns: Vec<Vec<f64>> = at_bound.into_iter().map(|i| base.fit.jacobian[i].clone()).collect();
+    let held = FeatureGroup::new(&columns, &base.model.data().layout, &base.whitener, &own)?;
+    let pressed = score(norm2(&r), held.explained(&r), r.len(), held.columns.len()) > PRESSED;
     pressed.then_some((own, r))
 }
 

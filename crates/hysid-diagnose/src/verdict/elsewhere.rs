@@ -16,9 +16,9 @@ pub fn elsewhere(pool: &[Hypothesis<'_>], told: usize) -> Vec<String> {
     let likely = |h: &&Hypothesis<'_>| h.log_evidence > best.log_evidence - TIE && h.mechanisms() == best.mechanisms();
     for other in pool.iter().filter(likely) {
         for e in best.effects.iter().filter(|e| !holds(other, e)) {
-            let mut there = other.effects.iter().filter(|o| o.mechanism.id == e.mechanism.id && !holds(best, o));
-            let of_one_name = other.effects.iter().find(|o| o.states_the_same(e) && !holds(best, o));
-            out.extend(of_one_name.or_else(|| there.next()).map(|o| {
+            let there = other.effects.iter().filter(|o| o.mechanism.id == e.mechanism.id && !holds(best, o));
+            // Of its own name first.
+            out.extend(there.min_by_key(|o| o.slot.label != e.slot.label).map(|o| {
                 let (id, label) = (e.mechanism.id, &e.slot.label);
                 let (here, there) = (&e.slot.whereabouts, &o.slot.whereabouts);
                 if o.slot.label == *label {

@@ -17,7 +17,6 @@ use hysid_linalg::dot;
 use super::MOST_TERMS;
 use super::regress::regress;
 use super::view::View;
-
 use crate::evidence::{Wander, Whitener, norm2};
 use crate::file::TermRecord;
 use crate::mechanism::SLOW;
