@@ -46,6 +46,15 @@ impl Layout {
         self.len() == 0
     }
 
+    /// The series, each after its place among those of its output.
+    pub fn runs(&self) -> impl Iterator<Item = (usize, &Series)> {
+        let mut seen = vec![0; self.outputs];
+        self.series.iter().map(move |s| {
+            seen[s.output] += 1;
+            (seen[s.output] - 1, s)
+        })
+    }
+
     /// One noise model for each output, fitted to this stacked residual, with what they share (neither colour nor that for an order of 0); `paths[output]` are the
     /// ways of an unknown force to it, where there are any.
     pub fn fit_noise(&self, residual: &[f64], max_order: usize, paths: &[Vec<ForcePath>]) -> Whitener {
@@ -100,12 +109,27 @@ impl Whitener {
 
     /// As [`Whitener::apply`], into a buffer of the same length.
     pub fn apply_into(&self, layout: &Layout, stack: &[f64], out: &mut [f64]) {
-        for s in &layout.series {
-            self.models[s.output].whiten(&stack[s.rows.clone()], &mut out[s.rows.clone()]);
+        for (run, s) in layout.runs() {
+            self.models[s.output].whiten(run, &stack[s.rows.clone()], &mut out[s.rows.clone()]);
         }
         if let Some(shared) = &self.shared {
             shared.take_out(layout, out);
         }
+    }
+
+    /// The transpose of [`Whitener::apply`], in place.
+    pub fn transpose(&self, layout: &Layout, stack: &mut [f64]) {
+        if let Some(shared) = &self.shared {
+            shared.transpose(layout, stack);
+        }
+        for (run, s) in layout.runs() {
+            self.models[s.output].transpose(run, &mut stack[s.rows.clone()]);
+        }
+    }
+
+    /// The same for rows of another motion than that it was fitted to: what a force makes there is known by the mean of its ways.
+    pub fn elsewhere(&self) -> Self {
+        Self { models: self.models.iter().map(NoiseModel::elsewhere).collect(), shared: self.shared.clone() }
     }
 
     /// Colours unit white noise in place: the inverse of [`Whitener::apply`].
@@ -113,20 +137,20 @@ impl Whitener {
         if let Some(shared) = &self.shared {
             shared.put_in(layout, stack);
         }
-        for s in &layout.series {
-            self.models[s.output].colour(&mut stack[s.rows.clone()]);
+        for (run, s) in layout.runs() {
+            self.models[s.output].colour(run, &mut stack[s.rows.clone()]);
         }
     }
 
     /// Sum over rows of the logarithm of the innovation's standard deviation: the determinant's share of a log likelihood.
     pub fn log_scale(&self, layout: &Layout) -> f64 {
-        layout.series.iter().map(|s| self.log_scale_of(layout, s)).sum()
+        layout.runs().map(|(run, s)| self.log_scale_of(layout, run, s)).sum()
     }
 
-    /// The share that a series has in [`Whitener::log_scale`].
-    pub fn log_scale_of(&self, layout: &Layout, s: &Series) -> f64 {
+    /// The share that a series, after its place among those of its output, has in [`Whitener::log_scale`].
+    pub fn log_scale_of(&self, layout: &Layout, run: usize, s: &Series) -> f64 {
         let shared = self.shared.as_ref().map_or(0.0, |shared| shared.log_scale(layout, s));
-        self.models[s.output].log_scale(s.rows.len()) + s.rows.len() as f64 * shared
+        self.models[s.output].log_scale(run, s.rows.len()) + s.rows.len() as f64 * shared
     }
 
     /// Number of coefficients beyond the scales.

@@ -159,10 +159,11 @@ impl NoiseModel {
         let total: usize = stretches.iter().map(|s| s.len()).sum();
         let likelihood: f64 = stretches
             .iter()
-            .map(|s| {
+            .enumerate()
+            .map(|(run, s)| {
                 let mut w = vec![0.0; s.len()];
-                self.whiten(s, &mut w);
-                -0.5 * norm2(&w) - self.log_scale(s.len())
+                self.whiten(run, s, &mut w);
+                -0.5 * norm2(&w) - self.log_scale(run, s.len())
             })
             .sum();
         likelihood - 0.5 * self.coefficients() as f64 * (total.max(2) as f64).ln()
@@ -197,6 +198,14 @@ impl NoiseModel {
         }
     }
 
+    /// The same for rows of another motion than that it was fitted to.
+    pub fn elsewhere(&self) -> Self {
+        match &self.kind {
+            Kind::Driven(driven) => Self { kind: Kind::Driven(driven.elsewhere()), below: self.below },
+            Kind::Shaped(..) => self.clone(),
+        }
+    }
+
     /// Whether it goes on below the lowest line as an equation says that holds at every frequency: a force through the plant, or an autoregression alone.
     pub fn is_known_below(&self) -> bool {
         matches!(self.kind, Kind::Driven(_) | Kind::Shaped(_, None))
@@ -218,8 +227,8 @@ impl NoiseModel {
         }
     }
 
-    /// Whitens one contiguous stretch into `out` (same length): unit variance where the model holds.
-    pub fn whiten(&self, e: &[f64], out: &mut [f64]) {
+    /// Whitens a run of contiguous rows into `out` (same length): unit variance where the model holds. Runs are counted as the stretches were that it was fitted to.
+    pub fn whiten(&self, run: usize, e: &[f64], out: &mut [f64]) {
         match &self.kind {
             Kind::Shaped(ar, shape) => {
                 ar.whiten(e, out);
@@ -227,9 +236,24 @@ impl NoiseModel {
                     shape.scale(out, -1.0);
                 }
             }
-            Kind::Driven(driven) => driven.whiten(e, out),
+            Kind::Driven(driven) => driven.whiten(run, e, out),
         }
         self.below.whiten(out);
+    }
+
+    /// The transpose of [`NoiseModel::whiten`], in place. A filter that does not change with time is transposed by running it backwards; only the start, where it is
+    /// not settled, differs.
+    pub fn transpose(&self, run: usize, v: &mut [f64]) {
+        if let Kind::Driven(driven) = &self.kind
+            && driven.is_along(run, v.len())
+        {
+            self.below.whiten(v);
+            return driven.transpose(run, v);
+        }
+        v.reverse();
+        let backwards = v.to_vec();
+        self.whiten(run, &backwards, v);
+        v.reverse();
     }
 
     /// Scales the mean of a residual down to what it would be if the noise did not rise below the lowest line.
@@ -238,7 +262,7 @@ impl NoiseModel {
     }
 
     /// Colours unit white noise in place: the inverse of [`NoiseModel::whiten`].
-    pub fn colour(&self, w: &mut [f64]) {
+    pub fn colour(&self, run: usize, w: &mut [f64]) {
         self.below.colour(w);
         match &self.kind {
             Kind::Shaped(ar, shape) => {
@@ -247,15 +271,15 @@ impl NoiseModel {
                 }
                 ar.colour(w);
             }
-            Kind::Driven(driven) => driven.colour(w),
+            Kind::Driven(driven) => driven.colour(run, w),
         }
     }
 
-    /// Logarithm of the determinant of the transformation of `n` samples from white: their share of a log likelihood.
-    pub fn log_scale(&self, n: usize) -> f64 {
+    /// Logarithm of the determinant of the transformation of a run of `n` samples from white: their share of a log likelihood.
+    pub fn log_scale(&self, run: usize, n: usize) -> f64 {
         let lines = match &self.kind {
             Kind::Shaped(ar, shape) => n as f64 * ar.innovation().ln() + shape.as_ref().map_or(0.0, |s| s.log_scale(n)),
-            Kind::Driven(driven) => driven.log_scale(n),
+            Kind::Driven(driven) => driven.log_scale(run, n),
         };
         lines + self.below.log_scale()
     }

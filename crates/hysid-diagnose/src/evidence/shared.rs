@@ -65,6 +65,16 @@ impl Shared {
         });
     }
 
+    /// The transpose of [`Shared::take_out`].
+    pub fn transpose(&self, layout: &Layout, stack: &mut [f64]) {
+        self.each_moment(layout, stack, |w| {
+            for i in (0..w.len()).rev() {
+                let known: f64 = (i + 1..w.len()).map(|j| self.factor[(j, i)] * w[j]).sum();
+                w[i] = (w[i] - known) / self.factor[(i, i)];
+            }
+        });
+    }
+
     /// Gives independent rows the correlation: the inverse of [`Shared::take_out`].
     pub fn put_in(&self, layout: &Layout, white: &mut [f64]) {
         self.each_moment(layout, white, |w| {

@@ -159,8 +159,8 @@ fn separation(setting: &Setting<'_>, a: &Base<'_>, b: &Base<'_>, trial: &Trial) 
         let data = answered(truth, &trial.drive, substeps)?;
         distance(rival, rival_values, &data, substeps, noise)
     };
-    let forth = one(&da, &a.whitener, &db, &b.values())?;
-    let back = one(&db, &b.whitener, &da, &a.values())?;
+    let forth = one(&da, &a.whitener.elsewhere(), &db, &b.values())?;
+    let back = one(&db, &b.whitener.elsewhere(), &da, &a.values())?;
     Some(forth.min(back))
 }
 

@@ -18,13 +18,14 @@ impl Model<'_> {
     /// where [`Self::by_inputs`] has none.
     pub fn scores(&self, theta: &[f64], noise: &Whitener, residuals: &[Vec<f64>]) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
         let layout = &self.data.layout;
-        // A filter that does not change with time is transposed by running it backwards; only the start, where it is not settled, differs.
-        let reversed = |x: &[f64]| {
-            let mut out = x.to_vec();
-            layout.series.iter().for_each(|s| out[s.rows.clone()].reverse());
-            out
-        };
-        let weights: Vec<Vec<f64>> = residuals.iter().map(|r| reversed(&noise.apply(layout, &reversed(r)))).collect();
+        let weights: Vec<Vec<f64>> = residuals
+            .iter()
+            .map(|r| {
+                let mut weights = r.clone();
+                noise.transpose(layout, &mut weights);
+                weights
+            })
+            .collect();
         self.by_inputs(theta, &weights)
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hysid_plant::Simulation;
 
-use super::force::force_paths;
+use super::force::noise_of;
 use super::{Count, Model, Values};
 use crate::data::DataSet;
 use crate::evidence::{ForcePath, Projector, Whitener, norm2};
@@ -122,7 +122,6 @@ pub fn fit_simulation<'d>(
     kind: NoiseKind,
 ) -> Option<Base<'d>> {
     let data = model.data();
-    let order = if kind == NoiseKind::Coloured { MAX_AR } else { 0 };
     let mut noise = match whitener {
         Some(w) if kind == NoiseKind::Coloured || w.coefficients() == 0 => w.clone(),
         _ => data.layout.fit_noise(&data.about_means(), 0, &[]),
@@ -138,10 +137,10 @@ pub fn fit_simulation<'d>(
                 levenberg_marquardt(&model, &model.theta(values), &data.layout, &noise, None, options)?
             }
         };
-        if order > 0 {
-            paths = force_paths(&model, &f.theta, pushed);
-        }
-        noise = data.layout.fit_noise(&f.residual, order, &paths);
+        (noise, paths) = match kind {
+            NoiseKind::Coloured => noise_of(&model, &f.theta, &f.residual, pushed),
+            NoiseKind::White(_) => (data.layout.fit_noise(&f.residual, 0, &[]), Vec::new()),
+        };
         fit = Some(f);
     }
     let fit = fit?;

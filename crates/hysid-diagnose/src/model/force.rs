@@ -9,7 +9,9 @@ use hysid_plant::{Linearisation, Simulation};
 use nalgebra::{DMatrix, DVector, Schur};
 
 use super::Model;
-use crate::evidence::ForcePath;
+use super::base::MAX_AR;
+use super::course::{Along, changes};
+use crate::evidence::{Course, ForcePath, Whitener};
 use crate::slot::{Place, Structure, Target};
 
 /// Iterations for each state in which eigenvalues are found.
@@ -31,25 +33,61 @@ pub fn pushed(simulation: &Simulation) -> Vec<String> {
     names
 }
 
-/// The ways from a force at each of the `pushed` states to each output.
-pub fn force_paths(model: &Model<'_>, theta: &[f64], pushed: &[String]) -> Vec<Vec<ForcePath>> {
-    let simulation = model.simulation();
-    let n = simulation.states.len();
-    let entries: Vec<usize> =
-        pushed.iter().filter_map(|name| simulation.states.iter().position(|s| s.name == *name)).collect();
-    if entries.is_empty() {
-        return Vec::new();
+/// The noise of what a simulation leaves, with the ways of a force to its outputs: row by row along its trajectory where it is not white and the equations
+/// answer a force differently along that.
+pub fn noise_of(
+    model: &Model<'_>,
+    theta: &[f64],
+    residual: &[f64],
+    pushed: &[String],
+) -> (Whitener, Vec<Vec<ForcePath>>) {
+    let layout = &model.data().layout;
+    let ways = Ways::of(model, theta, pushed);
+    let paths = ways.as_ref().map_or_else(Vec::new, |ways| ways.paths(model, |_, _| None));
+    let noise = layout.fit_noise(residual, MAX_AR, &paths);
+    let along = ways.filter(|ways| !noise.is_white() && changes(&ways.points));
+    let Some((ways, along)) = along.and_then(|ways| Some((ways, Along::of(model, theta)?))) else {
+        return (noise, paths);
+    };
+    let paths = ways.paths(model, |entry, output| along.course(model, entry, output));
+    (layout.fit_noise(residual, MAX_AR, &paths), paths)
+}
+
+/// The equations at instants of a simulation, and the states at which a force may enter.
+struct Ways {
+    entries: Vec<usize>,
+    points: Vec<Linearisation>,
+}
+
+impl Ways {
+    /// `None` where no force enters, or the simulation diverges.
+    fn of(model: &Model<'_>, theta: &[f64], pushed: &[String]) -> Option<Self> {
+        let states = &model.simulation().states;
+        let entries: Vec<usize> =
+            pushed.iter().filter_map(|name| states.iter().position(|s| s.name == *name)).collect();
+        if entries.is_empty() {
+            return None;
+        }
+        let points = model.linearised(theta, INSTANTS);
+        (!points.is_empty()).then_some(Self { entries, points })
     }
-    let points = model.linearised(theta, INSTANTS);
-    if points.is_empty() {
-        return Vec::new();
+
+    /// The mean way from each entry to each output, with its course (by entry and output), where there is one.
+    fn paths(&self, model: &Model<'_>, course: impl Fn(usize, usize) -> Option<Course>) -> Vec<Vec<ForcePath>> {
+        let simulation = model.simulation();
+        let n = simulation.states.len();
+        let a = middle_flow(&self.points, n);
+        let c: Vec<f64> =
+            (0..n * simulation.outputs.len()).map(|i| middle(self.points.iter().map(|p| p.c[i]))).collect();
+        let period_s = model.data().row_period_s();
+        let way = |entry: usize, output: usize, c: &[f64]| {
+            Some(ForcePath::held(&a, entry, c, period_s)?.along(course(entry, output)))
+        };
+        c.chunks_exact(n)
+            .enumerate()
+            .map(|(output, c)| self.entries.iter().filter_map(|&entry| way(entry, output, c)).collect())
+            .collect()
     }
-    let a = middle_flow(&points, n);
-    let c: Vec<f64> = (0..n * simulation.outputs.len()).map(|i| middle(points.iter().map(|p| p.c[i]))).collect();
-    let period_s = model.data().row_period_s();
-    c.chunks_exact(n)
-        .map(|c| entries.iter().filter_map(|&entry| ForcePath::held(&a, entry, c, period_s)).collect())
-        .collect()
 }
 
 /// The matrix of the state derivatives by the states, by rows, as it is for most of the time.
@@ -145,7 +183,7 @@ mod tests {
         asked(&states, 0.0, |model, theta| {
             let names = pushed(model.simulation());
             assert_eq!(names, ["w"]);
-            force_paths(model, theta, &names)
+            Ways::of(model, theta, &names).unwrap().paths(model, |_, _| None)
         })
     }
 

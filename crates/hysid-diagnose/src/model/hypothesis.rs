@@ -9,8 +9,8 @@ use crate::budget::Budget;
 use crate::data::{DataSet, held_out_blocks};
 use crate::evidence::Whitener;
 use crate::mechanism::{Amplitudes, Mechanism, Places, Purpose, Rewritten, Shape};
-use crate::model::base::{Base, MAX_AR, NoiseKind, Start, fit_simulation};
-use crate::model::force::force_paths;
+use crate::model::base::{Base, NoiseKind, Start, fit_simulation};
+use crate::model::force::noise_of;
 use crate::model::{Count, Model, Values};
 use crate::refit::{Held, LmOptions, Problem, go_on};
 use crate::slot::Slot;
@@ -162,8 +162,8 @@ pub fn block_score(setting: &Setting<'_>, h: &Hypothesis<'_>) -> Option<OnBlocks
     let white = h.base.whitener.apply(&data.layout, &fit.residual);
     let scales = data.scales();
     let (mut score, mut squares) = (0.0, Vec::new());
-    for s in &data.layout.series {
-        let scale = h.base.whitener.log_scale_of(&data.layout, s) / s.rows.len() as f64;
+    for (run, s) in data.layout.runs() {
+        let scale = h.base.whitener.log_scale_of(&data.layout, run, s) / s.rows.len() as f64;
         for row in s.rows.clone().filter(|&row| weights[row] == 0.0) {
             score -= 0.5 * white[row] * white[row] + scale;
             squares.push((fit.residual[row] / scales[s.output]).powi(2));
@@ -219,8 +219,7 @@ impl<'d> Setting<'d> {
         let model = Model::new(document, self.data, self.substeps).ok()?;
         let theta = model.theta(values);
         let residual = model.residual(&theta)?;
-        let paths = force_paths(&model, &theta, &self.pushed);
-        Some(self.data.layout.fit_noise(&residual, MAX_AR, &paths))
+        Some(noise_of(&model, &theta, &residual, &self.pushed).0)
     }
 
     /// Goes on with a fitted document; the noise model is that given, then its own.

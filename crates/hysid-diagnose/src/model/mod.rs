@@ -6,6 +6,7 @@
 mod adjoint;
 mod along;
 pub mod base;
+mod course;
 pub mod force;
 mod growth;
 pub mod hold;

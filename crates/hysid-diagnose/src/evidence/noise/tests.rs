@@ -28,7 +28,7 @@ fn pink(n: usize, seed: u64) -> Vec<f64> {
 /// Power of the lowest lines of a whitened series over that of all.
 fn lowest(m: &NoiseModel, e: &[f64]) -> f64 {
     let mut w = vec![0.0; e.len()];
-    m.whiten(e, &mut w);
+    m.whiten(0, e, &mut w);
     let power: Vec<f64> = fourier(&w).iter().map(|(re, im)| (re * re + im * im) / e.len() as f64).collect();
     power[1..20].iter().sum::<f64>() / 19.0
 }
@@ -66,7 +66,7 @@ fn an_offset_is_no_colour_of_the_noise() {
         assert!((m.innovation() / without.innovation() - 1.0).abs() < 1e-9);
         assert_eq!(m.coefficients() == 0, coefficient == 0.0);
         let mut w = vec![0.0; n];
-        m.whiten(&raised, &mut w);
+        m.whiten(0, &raised, &mut w);
         // Standard errors by which the mean stands out: its own size in white noise; under a colour the mean may hold more.
         let expected = offset * (1.0 - coefficient) * (n as f64).sqrt();
         let found = mean(&w) * (n as f64).sqrt();
@@ -104,8 +104,8 @@ fn whitening_and_colouring_are_inverse_and_the_determinant_is_that_of_the_map() 
     let Kind::Shaped(_, Some(shape)) = &m.kind else { panic!("a shape") };
     let e = pink(600, 2);
     let mut w = vec![0.0; 600];
-    m.whiten(&e, &mut w);
-    m.colour(&mut w);
+    m.whiten(0, &e, &mut w);
+    m.colour(0, &mut w);
     assert!(e.iter().zip(&w).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + a.abs())));
     // The shape's determinant, column by column, on a short stretch.
     let n = 41;
@@ -137,8 +137,8 @@ fn a_slow_mismatch_in_a_fast_recording_costs_likelihood() {
     let likelihood = |e: &[f64]| {
         let m = NoiseModel::fit(&[e], 16, &[]);
         let mut w = vec![0.0; n];
-        m.whiten(e, &mut w);
-        -0.5 * norm2(&w) - m.log_scale(n)
+        m.whiten(0, e, &mut w);
+        -0.5 * norm2(&w) - m.log_scale(0, n)
     };
     assert!(likelihood(&e) > likelihood(&with) + 50.0, "{} {}", likelihood(&e), likelihood(&with));
 }
