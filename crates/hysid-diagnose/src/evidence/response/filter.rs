@@ -7,7 +7,7 @@
 use hysid_linalg::product_of_rows;
 use nalgebra::{DMatrix, DVector};
 
-use super::{ForcePath, dot_short};
+use super::{Colours, ForcePath, dot_short};
 
 /// Entries of a vector or of a row of a matrix that are worked on together.
 const LANE: usize = 8;
@@ -35,14 +35,19 @@ fn padded(matrix: &DMatrix<f64>) -> Vec<Lane> {
 ///
 /// A white force moves a state that was known. One with a memory has its variance from the start: it moves the others, and the two together, but its own
 /// variance stays.
-fn first_rise(path: &ForcePath, pole: f64, variance: f64) -> (Vec<Vec<Lane>>, [[f64; 2]; 2]) {
-    let direction = |parts: DVector<f64>| padded(&DMatrix::from_row_slice(1, parts.len(), parts.as_slice()));
-    if pole == 0.0 {
+fn first_rise(path: &ForcePath, colours: Colours, variance: f64) -> (Vec<Vec<Lane>>, [[f64; 2]; 2]) {
+    let rest = usize::from(colours.sensor != 0.0);
+    let direction = |parts: DVector<f64>| {
+        let whole = parts.len() + rest;
+        let parts = parts.resize_vertically(whole, 0.0);
+        padded(&DMatrix::from_row_slice(1, parts.len(), parts.as_slice()))
+    };
+    if colours.force == 0.0 {
         return (vec![direction(path.b.clone())], [[variance, 0.0], [0.0; 2]]);
     }
     let n = path.c.len();
-    let moved = path.b.clone().push(pole);
-    let own = DVector::zeros(n).push(pole);
+    let moved = path.b.clone().push(colours.force);
+    let own = DVector::zeros(n).push(colours.force);
     (vec![direction(moved), direction(own)], [[variance, 0.0], [0.0, -variance]])
 }
 
@@ -63,12 +68,12 @@ impl Filter {
     ///
     /// The covariance of the state never appears: from row to row it changes by a matrix of rank one (a white force) or two, whose factors follow a recursion
     /// of their own (M. Morf, G. S. Sidhu and T. Kailath, IEEE Transactions on Automatic Control 19 (1974), 315).
-    pub(in crate::evidence) fn new(path: &ForcePath, pole: f64, variance: f64, rows: usize) -> Option<Self> {
-        let (a, c) = path.with_force(pole);
+    pub(in crate::evidence) fn new(path: &ForcePath, colours: Colours, variance: f64, rows: usize) -> Option<Self> {
+        let (a, c) = path.coloured(colours);
         let n = c.len();
         let lanes = n.div_ceil(LANE);
         let columns = padded(&a.transpose());
-        let (mut rises, mut sizes) = first_rise(path, pole, variance);
+        let (mut rises, mut sizes) = first_rise(path, colours, variance);
         let (mut power, mut gain) = (1.0_f64, vec![[0.0; LANE]; lanes]);
         let (mut sigmas, mut gains): (Vec<f64>, Vec<Lane>) = (Vec::new(), Vec::new());
         let mut ahead = rises.clone();
@@ -127,6 +132,19 @@ impl Filter {
         }
     }
 
+    /// Sum of squares of the scaled innovations of stretches, and of the logarithms of their standard deviations.
+    pub(in crate::evidence) fn innovations(&self, stretches: &[Vec<f64>]) -> (f64, f64) {
+        let mut squares = 0.0;
+        for s in stretches {
+            self.run(s.len(), |sigma, predicted, k| {
+                let innovation = s[k] - predicted;
+                squares += (innovation / sigma).powi(2);
+                innovation
+            });
+        }
+        (squares, stretches.iter().map(|s| self.log_scale(s.len())).sum())
+    }
+
     /// Number of states.
     pub(in crate::evidence) fn order(&self) -> usize {
         self.c.len()
@@ -135,56 +153,5 @@ impl Filter {
     pub(in crate::evidence) fn log_scale(&self, n: usize) -> f64 {
         let first: f64 = self.sigmas.iter().take(n).map(|s| s.ln()).sum();
         first + n.saturating_sub(self.sigmas.len()) as f64 * self.sigma(usize::MAX).ln()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::samples::*;
-    use super::*;
-
-    #[test]
-    fn the_innovations_are_the_cholesky_factor_of_the_covariance() {
-        // The covariance written down from the impulse response, for a white and a coloured force.
-        for (path, pole) in [(oscillator(), 0.0), (integrator(), 0.0), (oscillator(), 0.75)] {
-            let (n, share) = (40, 50.0);
-            let (a, c) = path.with_force(pole);
-            // What is added at each row, and what is there at the start.
-            let (mut added, mut p) = (DMatrix::zeros(c.len(), c.len()), DMatrix::zeros(c.len(), c.len()));
-            if pole == 0.0 {
-                added = &path.b * path.b.transpose();
-            } else {
-                let last = c.len() - 1;
-                (added[(last, last)], p[(last, last)]) = (1.0 - pole * pole, 1.0);
-            }
-            let covariance = {
-                let mut all = DMatrix::identity(n, n);
-                for i in 0..n {
-                    let mut row = &p * &c;
-                    for j in i..n {
-                        let v = share * c.dot(&row);
-                        all[(i, j)] += v;
-                        if j > i {
-                            all[(j, i)] += v;
-                        }
-                        row = &a * row;
-                    }
-                    p = &a * &p * a.transpose() + &added;
-                }
-                all
-            };
-            let factor = covariance.cholesky().unwrap();
-            let e = white(n, 4);
-            let expected = factor.l().solve_lower_triangular(&DVector::from_column_slice(&e)).unwrap();
-            let filter = Filter::new(&path, pole, share, n).unwrap();
-            let mut w = vec![0.0; n];
-            filter.run(n, |sigma, predicted, k| {
-                w[k] = (e[k] - predicted) / sigma;
-                e[k] - predicted
-            });
-            assert!(w.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{pole}");
-            let log: f64 = factor.l().diagonal().iter().map(|d| d.ln()).sum();
-            assert!((log - filter.log_scale(n)).abs() < 1e-6, "{log} {}", filter.log_scale(n));
-        }
     }
 }

@@ -17,6 +17,22 @@ pub(super) use filter::Filter;
 pub use moving::Course;
 pub(super) use moving::{Moved, MovingFilter};
 
+/// First-order autoregressions of a force and of the sensor's noise: their poles, 0 where one is white.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Colours {
+    pub force: f64,
+    pub sensor: f64,
+}
+
+impl Colours {
+    pub const WHITE: Self = Self { force: 0.0, sensor: 0.0 };
+
+    /// Number of coefficients: the share of the force, and each pole.
+    pub fn coefficients(self) -> usize {
+        1 + [self.force, self.sensor].into_iter().filter(|pole| *pole != 0.0).count()
+    }
+}
+
 /// The way from a force to one output, from row to row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForcePath {
@@ -91,16 +107,24 @@ impl ForcePath {
         self.course.as_ref()
     }
 
-    /// Matrix and output of the way with a force of this pole: one with a memory is a state of its own, the last.
-    fn with_force(&self, pole: f64) -> (DMatrix<f64>, DVector<f64>) {
+    /// Matrix and output of the way with noises of these colours: a force with a memory is a state of its own, and so is the last output without the noise of a
+    /// sensor that has one, from whose differences it is taken.
+    fn coloured(&self, colours: Colours) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.c.len();
-        if pole == 0.0 {
-            return (self.a.clone(), self.c.clone());
+        let (mut a, mut c) = (self.a.clone(), self.c.clone());
+        if colours.force != 0.0 {
+            a = a.resize(n + 1, n + 1, 0.0);
+            a.view_mut((0, n), (n, 1)).copy_from(&self.b);
+            a[(n, n)] = colours.force;
+            c = c.resize_vertically(n + 1, 0.0);
         }
-        let mut a = self.a.clone().resize(n + 1, n + 1, 0.0);
-        a.view_mut((0, n), (n, 1)).copy_from(&self.b);
-        a[(n, n)] = pole;
-        (a, self.c.clone().resize_vertically(n + 1, 0.0))
+        if colours.sensor != 0.0 {
+            let n = c.len();
+            a = a.resize(n + 1, n + 1, 0.0);
+            a.view_mut((n, 0), (1, n)).copy_from(&c.transpose());
+            c = c.push(-colours.sensor);
+        }
+        (a, c)
     }
 
     /// Variance of the output, `rows` rows from the start, for a force of unit variance that begins at zero.

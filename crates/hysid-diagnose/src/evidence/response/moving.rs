@@ -7,13 +7,17 @@
 //! Reference: B. D. O. Anderson, J. B. Moore, Optimal Filtering, Prentice-Hall (1979), sec. 3.1 (the filter of a system that varies with time) and 5.3 (its
 //! innovations).
 
-use super::dot_short as dot;
+use nalgebra::{DMatrix, DMatrixView, DVectorView};
+
+use super::{Colours, dot_short as dot};
 use crate::evidence::norm2;
 
 /// A way from a force to one output that changes from row to row, for each run of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
-    states: usize,
+    pub(super) states: usize,
+    /// The state that is a force with a memory, which has its variance from the start.
+    remembered: Option<usize>,
     /// Of each row of each run: the matrix to the next row (by rows), what a unit force adds to it, the output.
     runs: Vec<Vec<f64>>,
 }
@@ -22,7 +26,7 @@ impl Course {
     /// Of the rows of each run, as they stand in [`Course`]; `None` where one is not finite.
     pub fn new(states: usize, runs: Vec<Vec<f64>>) -> Option<Self> {
         let finite = states > 0 && runs.iter().flatten().all(|x| x.is_finite());
-        finite.then_some(Self { states, runs })
+        finite.then_some(Self { states, remembered: None, runs })
     }
 
     /// Numbers that a row takes.
@@ -36,7 +40,10 @@ impl Course {
     }
 
     /// Matrix, force and output of each row of a run.
-    fn steps(&self, run: usize) -> impl DoubleEndedIterator<Item = (&[f64], &[f64], &[f64])> + ExactSizeIterator {
+    pub(super) fn steps(
+        &self,
+        run: usize,
+    ) -> impl DoubleEndedIterator<Item = (&[f64], &[f64], &[f64])> + ExactSizeIterator {
         let n = self.states;
         self.runs[run].chunks_exact(Self::width(n)).map(move |row| {
             let (a, rest) = row.split_at(n * n);
@@ -45,37 +52,48 @@ impl Course {
         })
     }
 
-    /// The same for a force of this pole: one with a memory is a state of its own, the last.
-    fn with_force(&self, pole: f64) -> Self {
-        if pole == 0.0 {
+    /// The same for noises of these colours: a force with a memory is a state of its own, and so is the last output without the noise of a sensor that has one,
+    /// from whose differences it is taken.
+    fn coloured(&self, colours: Colours) -> Self {
+        let n = self.states;
+        let (of_force, of_sensor) = (usize::from(colours.force != 0.0), usize::from(colours.sensor != 0.0));
+        if of_force + of_sensor == 0 {
             return self.clone();
         }
-        let n = self.states;
+        let states = n + of_force + of_sensor;
         let longer = |run: usize| {
-            let mut rows = Vec::with_capacity(self.rows(run) * Self::width(n + 1));
+            let mut rows = Vec::with_capacity(self.rows(run) * Self::width(states));
             for (a, b, c) in self.steps(run) {
-                a.chunks_exact(n).zip(b).for_each(|(a, b)| rows.extend(a.iter().chain([b])));
-                rows.extend(std::iter::repeat_n(0.0, n).chain([pole]));
-                rows.extend(std::iter::repeat_n(0.0, n).chain([(1.0 - pole * pole).sqrt()]));
-                rows.extend(c.iter().chain(&[0.0]));
+                let row = rows.len();
+                rows.resize(row + Self::width(states), 0.0);
+                let (matrix, rest) = rows[row..].split_at_mut(states * states);
+                let (force, output) = rest.split_at_mut(states);
+                matrix.chunks_exact_mut(states).zip(a.chunks_exact(n)).for_each(|(to, a)| to[..n].copy_from_slice(a));
+                if of_force > 0 {
+                    (0..n).for_each(|i| matrix[i * states + n] = b[i]);
+                    matrix[n * states + n] = colours.force;
+                    force[n] = (1.0 - colours.force * colours.force).sqrt();
+                } else {
+                    force[..n].copy_from_slice(b);
+                }
+                output[..n].copy_from_slice(c);
+                if of_sensor > 0 {
+                    matrix[(states - 1) * states..][..n].copy_from_slice(c);
+                    output[states - 1] = -colours.sensor;
+                }
             }
             rows
         };
-        Self { states: n + 1, runs: (0..self.runs.len()).map(longer).collect() }
+        let remembered = (of_force > 0).then_some(n);
+        Self { states, remembered, runs: (0..self.runs.len()).map(longer).collect() }
     }
 
     /// Runs the filter for a force of this variance, and unit variance of the sensor, through a run: `f(row, sigma, gain)` for each row, until a covariance is not finite.
-    fn filter(
-        &self,
-        run: usize,
-        (pole, variance): (f64, f64),
-        mut f: impl FnMut(&[f64], &[f64], f64, &[f64]),
-    ) -> Option<()> {
+    fn filter(&self, run: usize, variance: f64, mut f: impl FnMut(&[f64], &[f64], f64, &[f64])) -> Option<()> {
         let n = self.states;
         let mut p = vec![0.0; n * n];
-        if pole != 0.0 {
-            // One with a memory has its variance from the start.
-            p[n * n - 1] = variance;
+        if let Some(force) = self.remembered {
+            p[force * (n + 1)] = variance;
         }
         let (mut pc, mut gain, mut ap) = (vec![0.0; n], vec![0.0; n], vec![0.0; n * n]);
         for (a, b, c) in self.steps(run) {
@@ -101,7 +119,7 @@ impl Course {
     }
 }
 
-/// The filter of a course for a force of one pole, for noise of the sensor with unit variance.
+/// The filter of a course, for noise of the sensor with innovations of unit variance.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::evidence) struct MovingFilter {
     course: Course,
@@ -110,29 +128,25 @@ pub(in crate::evidence) struct MovingFilter {
     gains: Vec<Vec<f64>>,
 }
 
-/// A course with the pole of the force that moves it.
-pub(in crate::evidence) struct Moved {
-    course: Course,
-    pole: f64,
-}
+/// A course with noises of some colours.
+pub(in crate::evidence) struct Moved(Course);
 
 impl Moved {
     /// `None` where the course has other runs than these stretches.
-    pub(in crate::evidence) fn new(course: &Course, pole: f64, stretches: &[&[f64]]) -> Option<Self> {
-        let same = course.runs.len() == stretches.len()
-            && stretches.iter().enumerate().all(|(i, s)| course.rows(i) == s.len());
-        same.then(|| Self { course: course.with_force(pole), pole })
+    pub(in crate::evidence) fn new(course: &Course, colours: Colours, stretches: &[&[f64]]) -> Option<Self> {
+        let rows = stretches.iter().enumerate().all(|(run, s)| course.rows(run) == s.len());
+        (rows && course.runs.len() == stretches.len()).then(|| Self(course.coloured(colours)))
     }
 
     /// Sum of squares of the scaled innovations of stretches, and of the logarithms of their standard deviations, under a force of this variance.
-    pub(in crate::evidence) fn innovations(&self, variance: f64, stretches: &[&[f64]]) -> Option<(f64, f64)> {
+    pub(in crate::evidence) fn innovations(&self, variance: f64, stretches: &[Vec<f64>]) -> Option<(f64, f64)> {
         let (mut squares, mut log) = (0.0, 0.0);
-        let n = self.course.states;
+        let n = self.0.states;
         let (mut x, mut next) = (vec![0.0; n], vec![0.0; n]);
         for (run, e) in stretches.iter().enumerate() {
             x.fill(0.0);
             let mut rows = e.iter();
-            self.course.filter(run, (self.pole, variance), |a, c, sigma, gain| {
+            self.0.filter(run, variance, |a, c, sigma, gain| {
                 let innovation = rows.next().map_or(0.0, |e| e - dot(c, &x));
                 squares += (innovation / sigma).powi(2);
                 log += sigma.ln();
@@ -143,17 +157,38 @@ impl Moved {
         Some((squares, log))
     }
 
+    /// The variance that a force of unit variance gives the output, without what the rows before tell of it, at each row of each run.
+    pub(in crate::evidence) fn spread(&self) -> Vec<Vec<f64>> {
+        let n = self.0.states;
+        let of_run = |run: usize| {
+            let mut p = DMatrix::<f64>::zeros(n, n);
+            if let Some(force) = self.0.remembered {
+                p[(force, force)] = 1.0;
+            }
+            let rows = self.0.steps(run).map(|(a, b, c)| {
+                let (a, b) = (DMatrixView::from_slice(a, n, n), DVectorView::from_slice(b, n));
+                let c = DVectorView::from_slice(c, n);
+                let variance = c.dot(&(&p * c));
+                // By rows, the matrix is its transpose to a view by columns.
+                p = a.tr_mul(&p) * a + b * b.transpose();
+                variance
+            });
+            rows.collect()
+        };
+        (0..self.0.runs.len()).map(of_run).collect()
+    }
+
     /// The filter for a force of this variance.
     pub(in crate::evidence) fn filter(self, variance: f64) -> Option<MovingFilter> {
-        let runs = 0..self.course.runs.len();
+        let runs = 0..self.0.runs.len();
         let (mut sigmas, mut gains) = (vec![Vec::new(); runs.len()], vec![Vec::new(); runs.len()]);
         for run in runs {
-            self.course.filter(run, (self.pole, variance), |_, _, sigma, gain| {
+            self.0.filter(run, variance, |_, _, sigma, gain| {
                 sigmas[run].push(sigma);
                 gains[run].extend_from_slice(gain);
             })?;
         }
-        Some(MovingFilter { course: self.course, sigmas, gains })
+        Some(MovingFilter { course: self.0, sigmas, gains })
     }
 }
 
@@ -210,78 +245,9 @@ impl MovingFilter {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{DMatrix, DVector};
-
     use super::super::samples::*;
     use super::super::{Filter, ForcePath};
     use super::*;
-
-    const N: usize = 40;
-    const VARIANCE: f64 = 30.0;
-
-    /// Two runs of an oscillator whose stiffness, drive and output go up and down.
-    fn swaying() -> Course {
-        let run = |from: usize| {
-            let rows = (from..from + N).flat_map(|k| {
-                let s = (0.3 * k as f64).sin();
-                [0.9, 0.2 + 0.1 * s, -0.3 - 0.2 * s, 0.85, 0.02, 0.1 + 0.08 * s, 1.0 + 0.7 * s, 0.1]
-            });
-            rows.collect()
-        };
-        Course::new(2, vec![run(0), run(100)]).unwrap()
-    }
-
-    /// The covariance of a run, written down from its equations.
-    fn covariance(course: &Course, run: usize, pole: f64) -> DMatrix<f64> {
-        let n = course.states;
-        // Each force from its row on, through all later ones; one with a memory is a filtered white one.
-        let steps: Vec<(DMatrix<f64>, DVector<f64>, DVector<f64>)> = (course.steps(run))
-            .map(|(a, b, c)| (DMatrix::from_row_slice(n, n, a), DVector::from_row_slice(b), DVector::from_row_slice(c)))
-            .collect();
-        let answer = DMatrix::from_fn(N, N, |_, _| 0.0);
-        let answer = (0..N).fold(answer, |mut answer, at| {
-            let mut x = DVector::zeros(n);
-            for (row, (a, b, c)) in steps.iter().enumerate() {
-                answer[(row, at)] = c.dot(&x);
-                x = a * x + if row == at { b.clone() } else { DVector::zeros(n) };
-            }
-            answer
-        });
-        let force = DMatrix::from_fn(N, N, |i, j| VARIANCE * pole.powi(i.abs_diff(j) as i32));
-        let force = if pole == 0.0 { DMatrix::identity(N, N) * VARIANCE } else { force };
-        DMatrix::identity(N, N) + &answer * force * answer.transpose()
-    }
-
-    #[test]
-    fn the_innovations_are_the_cholesky_factor_of_the_covariance() {
-        let e = [white(N, 4), white(N, 5)];
-        let stretches = [e[0].as_slice(), e[1].as_slice()];
-        for pole in [0.0, 0.75] {
-            let moved = Moved::new(&swaying(), pole, &stretches).unwrap();
-            let (squares, log) = moved.innovations(VARIANCE, &stretches).unwrap();
-            let filter = moved.filter(VARIANCE).unwrap();
-            let (mut all, mut logs) = (0.0, 0.0);
-            for (run, e) in stretches.iter().enumerate() {
-                let factor = covariance(&swaying(), run, pole).cholesky().unwrap().l();
-                let expected = factor.solve_lower_triangular(&DVector::from_column_slice(e)).unwrap();
-                let mut w = vec![0.0; N];
-                filter.run(run, |sigma, predicted, k| {
-                    w[k] = (e[k] - predicted) / sigma;
-                    e[k] - predicted
-                });
-                assert!(w.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-9), "{pole}");
-                let own: f64 = factor.diagonal().iter().map(|d| d.ln()).sum();
-                assert!((own - filter.log_scale(run)).abs() < 1e-9);
-                // The transpose, by the factor's own.
-                let mut back = e.to_vec();
-                filter.transpose(run, &mut back);
-                let expected = factor.tr_solve_lower_triangular(&DVector::from_column_slice(e)).unwrap();
-                assert!(back.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-9), "{pole}");
-                (all, logs) = (all + norm2(&w), logs + own);
-            }
-            assert!((all - squares).abs() < 1e-9 && (logs - log).abs() < 1e-9);
-        }
-    }
 
     #[test]
     fn a_way_that_does_not_change_is_that_of_the_settled_filter() {
@@ -290,16 +256,28 @@ mod tests {
         let n = 2000;
         let e = simulated(&path, &white(n, 1), 20.0, 2);
         let course = Course::new(2, vec![row.repeat(n)]).unwrap();
-        let filter = Moved::new(&course, 0.0, &[&e]).unwrap().filter(400.0).unwrap();
-        let settled = Filter::new(&path, 0.0, 400.0, n).unwrap();
-        let mut expected = vec![0.0; n];
-        settled.run(n, |_, predicted, k| {
-            expected[k] = predicted;
-            e[k] - predicted
-        });
-        filter.run(0, |sigma, predicted, k| {
-            assert!((predicted - expected[k]).abs() < 1e-6 && (sigma - settled.sigma(k)).abs() < 1e-6, "{k}");
-            e[k] - predicted
-        });
+        for colours in [Colours::WHITE, Colours { force: 0.8, sensor: 0.0 }, Colours { force: 0.0, sensor: 0.6 }] {
+            let filter = Moved::new(&course, colours, &[&e]).unwrap().filter(400.0).unwrap();
+            let settled = Filter::new(&path, colours, 400.0, n).unwrap();
+            let mut expected = vec![0.0; n];
+            settled.run(n, |_, predicted, k| {
+                expected[k] = predicted;
+                e[k] - predicted
+            });
+            filter.run(0, |sigma, predicted, k| {
+                assert!((predicted - expected[k]).abs() < 1e-6 && (sigma - settled.sigma(k)).abs() < 1e-6, "{k}");
+                e[k] - predicted
+            });
+        }
+    }
+
+    #[test]
+    fn a_course_has_the_rows_of_its_stretches_or_none() {
+        let course = swaying(2);
+        let e = vec![0.0; 5];
+        assert!(Moved::new(&course, Colours::WHITE, &[&e[..2]]).is_some());
+        assert!(Moved::new(&course, Colours::WHITE, &[&e]).is_none());
+        assert!(Moved::new(&course, Colours::WHITE, &[&e[..2], &e]).is_none());
+        assert!(Course::new(1, vec![vec![f64::NAN; 3]]).is_none());
     }
 }
