@@ -1,9 +1,10 @@
 //! How samples are stacked into rows, and the whitening of such a stack.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::noise::NoiseModel;
-use super::response::ForcePath;
+use super::response::{Course, ForcePath};
 use super::shared::Shared;
 
 /// A run of rows that follow each other in time: one output of one stretch, between gaps.
@@ -58,11 +59,22 @@ impl Layout {
     /// One noise model for each output, fitted to this stacked residual, with what they share (neither colour nor that for an order of 0); `paths[output]` are the
     /// ways of an unknown force to it, where there are any.
     pub fn fit_noise(&self, residual: &[f64], max_order: usize, paths: &[Vec<ForcePath>]) -> Whitener {
+        self.fit_noise_along(residual, max_order, paths, |output, way| paths[output][way].course())
+    }
+
+    /// The same with courses of the ways, by output and place among them, that are made where they are asked for.
+    pub fn fit_noise_along(
+        &self,
+        residual: &[f64],
+        max_order: usize,
+        paths: &[Vec<ForcePath>],
+        course: impl Fn(usize, usize) -> Option<Arc<Course>>,
+    ) -> Whitener {
         let models = (0..self.outputs)
             .map(|o| {
                 let stretches: Vec<&[f64]> =
                     self.series.iter().filter(|s| s.output == o).map(|s| &residual[s.rows.clone()]).collect();
-                NoiseModel::fit(&stretches, max_order, paths.get(o).map_or(&[], Vec::as_slice))
+                NoiseModel::along(&stretches, max_order, paths.get(o).map_or(&[], Vec::as_slice), |way| course(o, way))
             })
             .collect();
         let each = Whitener::of(models);

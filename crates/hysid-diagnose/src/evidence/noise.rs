@@ -10,13 +10,14 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
+use std::sync::Arc;
 
 use hysid_signal::{Autoregression, cosine_transform};
 
 use super::below::Below;
 use super::driven::Driven;
 use super::projector::norm2;
-use super::response::ForcePath;
+use super::response::{Course, ForcePath};
 use super::shape::{FIRST, SpectralShape, corners, even_knots, frequency, rise};
 
 /// Orders up to which a short autoregression is tried with a corner, beside the one that BIC chooses without a shape.
@@ -58,6 +59,16 @@ impl NoiseModel {
     ///
     /// A short autoregression with a corner may say in few coefficients what a long one says in many, so both are tried.
     pub fn fit(stretches: &[&[f64]], max_order: usize, paths: &[ForcePath]) -> Self {
+        Self::along(stretches, max_order, paths, |way| paths[way].course())
+    }
+
+    /// The same with courses of the ways, each by its place among them, that are made where they are asked for.
+    pub fn along(
+        stretches: &[&[f64]],
+        max_order: usize,
+        paths: &[ForcePath],
+        course: impl Fn(usize) -> Option<Arc<Course>>,
+    ) -> Self {
         let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
         if max_order == 0 || longest < SHORTEST {
             return Self::of(Autoregression::fit(stretches, max_order), None);
@@ -89,11 +100,13 @@ impl NoiseModel {
         let price = 0.5 * (total as f64).ln();
         // What looks white to an autoregression may hide a little of a force; most often it does not, and two looks tell.
         let white = best.coefficients() == 0;
-        for path in paths {
+        for (way, path) in paths.iter().enumerate() {
             if white && !Driven::hinted(path, stretches, most) {
                 continue;
             }
-            let Some((driven, likelihood)) = Driven::fit(path, stretches, price, most) else { continue };
+            let Some((driven, likelihood)) = Driven::fit(path, || course(way), stretches, price, most) else {
+                continue;
+            };
             let score = likelihood - price * driven.coefficients() as f64;
             if score > most {
                 let driven = Self { kind: Kind::Driven(driven), below: Below::LEVEL };

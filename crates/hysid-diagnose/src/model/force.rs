@@ -5,6 +5,10 @@
 //! friction holds for some of them, or its smoothed sign is steep, the moving ones decide. The error of a simulation that follows the recorded input
 //! has the response of the simulation as it is: a loop that the simulation contains is closed in it, one behind the recorded input is not.
 
+use std::cell::{LazyCell, RefCell};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use hysid_plant::{Linearisation, Simulation};
 use nalgebra::{DMatrix, DVector, Schur};
 
@@ -33,8 +37,8 @@ pub fn pushed(simulation: &Simulation) -> Vec<String> {
     names
 }
 
-/// The noise of what a simulation leaves, with the ways of a force to its outputs: row by row along its trajectory where it is not white and the equations
-/// answer a force differently along that.
+/// The noise of what a simulation leaves, with the ways of a force to its outputs: row by row along its trajectory where that was asked for and the equations
+/// answer a force differently along it.
 pub fn noise_of(
     model: &Model<'_>,
     theta: &[f64],
@@ -42,15 +46,24 @@ pub fn noise_of(
     pushed: &[String],
 ) -> (Whitener, Vec<Vec<ForcePath>>) {
     let layout = &model.data().layout;
-    let ways = Ways::of(model, theta, pushed);
-    let paths = ways.as_ref().map_or_else(Vec::new, |ways| ways.paths(model, |_, _| None));
-    let noise = layout.fit_noise(residual, MAX_AR, &paths);
-    let along = ways.filter(|ways| !noise.is_white() && changes(&ways.points));
-    let Some((ways, along)) = along.and_then(|ways| Some((ways, Along::of(model, theta)?))) else {
-        return (noise, paths);
+    let Some(ways) = Ways::of(model, theta, pushed) else {
+        return (layout.fit_noise(residual, MAX_AR, &[]), Vec::new());
     };
-    let paths = ways.paths(model, |entry, output| along.course(model, entry, output));
-    (layout.fit_noise(residual, MAX_AR, &paths), paths)
+    let paths = ways.paths(model);
+    let along = LazyCell::new(|| changes(&ways.points).then(|| Along::of(model, theta)).flatten());
+    let asked: RefCell<BTreeMap<(usize, usize), Option<Arc<Course>>>> = RefCell::default();
+    let course = |output: usize, way: usize| {
+        let mut asked = asked.borrow_mut();
+        let made = || along.as_ref()?.course(model, paths[output][way].entry(), output).map(Arc::new);
+        asked.entry((output, way)).or_insert_with(made).clone()
+    };
+    let noise = layout.fit_noise_along(residual, MAX_AR, &paths, course);
+    let asked = asked.into_inner();
+    let with = |output: usize, (way, path): (usize, &ForcePath)| {
+        path.clone().along(asked.get(&(output, way)).cloned().flatten())
+    };
+    let paths = paths.iter().enumerate().map(|(o, ways)| ways.iter().enumerate().map(|path| with(o, path)).collect());
+    (noise, paths.collect())
 }
 
 /// The equations at instants of a simulation, and the states at which a force may enter.
@@ -72,20 +85,16 @@ impl Ways {
         (!points.is_empty()).then_some(Self { entries, points })
     }
 
-    /// The mean way from each entry to each output, with its course (by entry and output), where there is one.
-    fn paths(&self, model: &Model<'_>, course: impl Fn(usize, usize) -> Option<Course>) -> Vec<Vec<ForcePath>> {
+    /// The mean way from each entry to each output.
+    fn paths(&self, model: &Model<'_>) -> Vec<Vec<ForcePath>> {
         let simulation = model.simulation();
         let n = simulation.states.len();
         let a = middle_flow(&self.points, n);
         let c: Vec<f64> =
             (0..n * simulation.outputs.len()).map(|i| middle(self.points.iter().map(|p| p.c[i]))).collect();
         let period_s = model.data().row_period_s();
-        let way = |entry: usize, output: usize, c: &[f64]| {
-            Some(ForcePath::held(&a, entry, c, period_s)?.along(course(entry, output)))
-        };
         c.chunks_exact(n)
-            .enumerate()
-            .map(|(output, c)| self.entries.iter().filter_map(|&entry| way(entry, output, c)).collect())
+            .map(|c| self.entries.iter().filter_map(|&entry| ForcePath::held(&a, entry, c, period_s)).collect())
             .collect()
     }
 }
@@ -183,7 +192,7 @@ mod tests {
         asked(&states, 0.0, |model, theta| {
             let names = pushed(model.simulation());
             assert_eq!(names, ["w"]);
-            Ways::of(model, theta, &names).unwrap().paths(model, |_, _| None)
+            Ways::of(model, theta, &names).unwrap().paths(model)
         })
     }
 

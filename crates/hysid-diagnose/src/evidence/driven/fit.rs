@@ -14,8 +14,10 @@ const POLES: [f64; 4] = [0.5, 0.75, 0.88, 0.94];
 const DECADES: (f64, f64) = (1.0, 0.25);
 /// The same between guesses of the memory of the sensor's noise.
 const MEMORY: f64 = 0.3;
-/// Log likelihood by which a white force may trail another model before its colour is not asked for.
+/// Log likelihood by which a force may trail another model before its colour, or its course, is not asked for.
 const HOPELESS: f64 = 150.0;
+/// Log likelihood that the way from row to row gains at the share by the mean one or a tenth of it, before it is looked into.
+const MATTERS: f64 = 0.5;
 /// Decades of the share of the force in the output's power that are searched.
 const RANGE: (f64, f64) = (-3.0, 9.0);
 /// Shares of a force, in the power of the sensor's noise, that are tried before any other where nothing else speaks for one.
@@ -43,6 +45,7 @@ impl Found {
 }
 
 /// One way of a force to stretches of a residual: the mean one, or its course from row to row.
+#[derive(Clone, Copy)]
 struct Way<'a> {
     path: &'a ForcePath,
     course: Option<&'a Course>,
@@ -53,15 +56,29 @@ struct Way<'a> {
 
 impl Driven {
     /// The process noise of these stretches of one residual by this way, with its log likelihood; colours where they pay `price` for each coefficient,
-    /// looked for where a white one comes near the likelihood `most` of another model.
-    pub fn fit(path: &ForcePath, stretches: &[&[f64]], price: f64, most: f64) -> Option<(Self, f64)> {
+    /// looked for where a white one comes near the likelihood `most` of another model. The `course` from row to row is asked for where the mean way does.
+    pub fn fit(
+        path: &ForcePath,
+        course: impl FnOnce() -> Option<Arc<Course>>,
+        stretches: &[&[f64]],
+        price: f64,
+        most: f64,
+    ) -> Option<(Self, f64)> {
         let rows = stretches.iter().map(|s| s.len()).max()?;
         let mean = Way { path, course: None, stretches, rows };
         let found = mean.best(price, most, 0.0)?;
-        let along = path.course().and_then(|course| {
+        let course = if found.likelihood < most - HOPELESS { None } else { course() };
+        let along = course.as_deref().and_then(|course| {
             let way = Way { course: Some(course), ..mean };
-            let found = way.best(price, most, found.decade)?;
-            (found.likelihood > way.only_unequal(found.colours)?).then_some((way, found))
+            // Where the way matters, the share and the colours by the mean one do better along it already, or a smaller share: what shows much here and there
+            // the mean way takes for much everywhere.
+            let at = way.likelihood(found.colours)?;
+            let likely = |decade: f64| at(decade).is_some_and(|(here, _)| here > found.likelihood + MATTERS);
+            if !likely(found.decade) && !likely(found.decade - DECADES.0) {
+                return None;
+            }
+            let along = way.best(price, most, found.decade)?;
+            (along.likelihood > way.only_unequal(along.colours)?).then_some((way, along))
         });
         let (way, found) = along.filter(|(_, along)| along.score(price) > found.score(price)).unwrap_or((mean, found));
         Some((way.noise(&found)?, found.likelihood))
@@ -159,7 +176,10 @@ impl<'a> Way<'a> {
         let white = self.share(Colours::WHITE, (decade, DECADES.0))?;
         let near = |found: &Found| found.likelihood >= most - HOPELESS;
         let force = if near(&white) { self.longer(&white, |force| Colours { force, sensor: 0.0 }) } else { None };
-        let sensor = self.longer(&white, |sensor| Colours { force: 0.0, sensor });
+        let remembers = |sensor: f64| Colours { force: 0.0, sensor };
+        let at = |sensor: f64| Some(self.likelihood(remembers(sensor))?(white.decade)?.0);
+        let likely = at(POLES[0]).is_some_and(|likelihood| likelihood > white.likelihood);
+        let sensor = if likely { self.longer(&white, remembers) } else { None };
         // Of a sensor's noise the memory itself is looked for: what is left of it would be in every sample.
         let sensor = sensor.map(|found| if near(&found) { self.memory(&found).unwrap_or(found) } else { found });
         let coloured = [force, sensor].into_iter().flatten();

@@ -153,7 +153,7 @@ mod tests {
         let size = 40.0;
         let e: Vec<Vec<f64>> =
             (0..2).map(|i| simulated(&path, &white(6000, 20 + i), size, 40 + i).into_iter().collect()).collect();
-        let (m, _) = Driven::fit(&path, &[&e[0], &e[1]], 4.7, f64::NEG_INFINITY).unwrap();
+        let (m, _) = Driven::fit(&path, || None, &[&e[0], &e[1]], 4.7, f64::NEG_INFINITY).unwrap();
         assert_eq!(m.coefficients(), 1);
         assert!((m.sigma - 1.0).abs() < 0.03, "{}", m.sigma);
         // The variance of the force, from the filter's settled innovation: it grows with the share alone.
@@ -167,13 +167,13 @@ mod tests {
         let (white_both, force, sensor) =
             (Colours::WHITE, Colours { force: 0.75, sensor: 0.0 }, Colours { force: 0.0, sensor: 0.6 });
         let both = Colours { force: 0.75, sensor: 0.6 };
-        let paths = [oscillator(), integrator(), still(), still().along(Some(swaying(n)))];
+        let paths = [oscillator(), integrator(), still(), still().along(Some(Arc::new(swaying(n))))];
         for (path, colours) in paths.iter().flat_map(|path| [white_both, force, sensor, both].map(|c| (path, c))) {
             let e = white(n, 4);
             let filter = Filter::new(path, colours, variance, n).unwrap();
             let moving = path
                 .course()
-                .map(|course| Arc::new(Moved::new(course, colours, &[&e]).unwrap().filter(variance).unwrap()));
+                .map(|course| Arc::new(Moved::new(&course, colours, &[&e]).unwrap().filter(variance).unwrap()));
             let noise = Driven { filter, moving, colours, sigma, rms: 1.0 };
             let factor = covariance(&answers(path, n), variance, colours).cholesky().unwrap().l() * sigma;
             let near = |a: &[f64], b: &DVector<f64>| a.iter().zip(b.iter()).all(|(a, b)| (a - b).abs() < 1e-6);
@@ -210,7 +210,7 @@ mod tests {
         let e: Vec<f64> = with.iter().zip(&without).zip(&own).map(|((a, b), own)| a - b + own).collect();
         let m = NoiseModel::fit(&[&e], 16, std::slice::from_ref(&path));
         assert!(m.is_driven() && m.coefficients() == 2, "{}", m.coefficients());
-        let (m, _) = Driven::fit(&path, &[&e], 4.4, f64::NEG_INFINITY).unwrap();
+        let (m, _) = Driven::fit(&path, || None, &[&e], 4.4, f64::NEG_INFINITY).unwrap();
         assert!((m.colours.sensor - pole).abs() < 0.05 && m.colours.force == 0.0, "{:?}", m.colours);
         assert!((m.sensor_rms() - 1.0).abs() < 0.05, "{}", m.sensor_rms());
     }

@@ -11,6 +11,8 @@ mod moving;
 #[cfg(test)]
 pub(super) mod samples;
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 pub(super) use filter::Filter;
@@ -36,11 +38,13 @@ impl Colours {
 /// The way from a force to one output, from row to row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForcePath {
+    /// The state in whose derivative the force enters, among all of the simulation.
+    entry: usize,
     a: DMatrix<f64>,
     b: DVector<f64>,
     c: DVector<f64>,
     /// The same from row to row, where the machine answers a force differently along its motion.
-    course: Option<Course>,
+    course: Option<Arc<Course>>,
 }
 
 /// Inner product of a few numbers.
@@ -89,6 +93,7 @@ impl ForcePath {
         })
         .exp();
         let path = Self {
+            entry,
             a: whole.view((0, 0), (m, m)).into_owned(),
             b: whole.view((0, m), (m, 1)).column(0).into_owned(),
             c: DVector::from_iterator(m, kept.iter().map(|&i| c[i])),
@@ -97,14 +102,19 @@ impl ForcePath {
         whole.iter().all(|x| x.is_finite()).then_some(path)
     }
 
+    /// The state in whose derivative the force enters, among all of the simulation.
+    pub fn entry(&self) -> usize {
+        self.entry
+    }
+
     /// The same way with its course from row to row, if there is one.
-    pub fn along(self, course: Option<Course>) -> Self {
+    pub fn along(self, course: Option<Arc<Course>>) -> Self {
         Self { course, ..self }
     }
 
     /// Its course from row to row.
-    pub(super) fn course(&self) -> Option<&Course> {
-        self.course.as_ref()
+    pub(super) fn course(&self) -> Option<Arc<Course>> {
+        self.course.clone()
     }
 
     /// Matrix and output of the way with noises of these colours: a force with a memory is a state of its own, and so is the last output without the noise of a

@@ -88,35 +88,123 @@ impl Course {
         Self { states, remembered, runs: (0..self.runs.len()).map(longer).collect() }
     }
 
-    /// Runs the filter for a force of this variance, and unit variance of the sensor, through a run: `f(row, sigma, gain)` for each row, until a covariance is not finite.
-    fn filter(&self, run: usize, variance: f64, mut f: impl FnMut(&[f64], &[f64], f64, &[f64])) -> Option<()> {
-        let n = self.states;
-        let mut p = vec![0.0; n * n];
-        if let Some(force) = self.remembered {
-            p[force * (n + 1)] = variance;
-        }
-        let (mut pc, mut gain, mut ap) = (vec![0.0; n], vec![0.0; n], vec![0.0; n * n]);
-        for (a, b, c) in self.steps(run) {
-            pc.iter_mut().zip(p.chunks_exact(n)).for_each(|(x, row)| *x = dot(row, c));
-            let power = 1.0 + dot(c, &pc);
-            if !(power > 0.0 && power.is_finite()) {
-                return None;
-            }
-            gain.iter_mut().zip(a.chunks_exact(n)).for_each(|(g, row)| *g = dot(row, &pc) / power);
-            f(a, c, power.sqrt(), &gain);
-            for (to, row) in ap.chunks_exact_mut(n).zip(a.chunks_exact(n)) {
-                to.iter_mut().enumerate().for_each(|(j, x)| *x = dot(row, &p[j * n..(j + 1) * n]));
-            }
-            for i in 0..n {
-                for j in 0..=i {
-                    let ahead = dot(&ap[i * n..(i + 1) * n], &a[j * n..(j + 1) * n]);
-                    let next = ahead + variance * b[i] * b[j] - power * gain[i] * gain[j];
-                    (p[i * n + j], p[j * n + i]) = (next, next);
-                }
-            }
-        }
-        Some(())
+    /// The rows of a run by arrays.
+    fn rows_of<const N: usize>(&self, run: usize) -> impl Iterator<Item = Row<N>> {
+        self.steps(run).map(|(a, b, c)| Row {
+            a: std::array::from_fn(|i| std::array::from_fn(|j| a[i * N + j])),
+            b: std::array::from_fn(|i| b[i]),
+            c: std::array::from_fn(|i| c[i]),
+        })
     }
+
+    /// The filter before the first row of a run.
+    fn begun<const N: usize>(&self, variance: f64) -> Riccati<N> {
+        let mut p = [[0.0; N]; N];
+        if let Some(force) = self.remembered {
+            p[force][force] = variance;
+        }
+        Riccati { p, variance }
+    }
+}
+
+/// A row by arrays: matrix, force, output.
+struct Row<const N: usize> {
+    a: [[f64; N]; N],
+    b: [f64; N],
+    c: [f64; N],
+}
+
+/// Inner product of a few numbers.
+fn inner<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    (0..N).map(|i| a[i] * b[i]).sum()
+}
+
+/// The covariance of the predicted state, for noise of the sensor with unit variance.
+struct Riccati<const N: usize> {
+    p: [[f64; N]; N],
+    variance: f64,
+}
+
+impl<const N: usize> Riccati<N> {
+    /// Power and gain of a row's innovation, and the covariance of the next row; `None` where that is not finite.
+    fn next(&mut self, row: &Row<N>) -> Option<(f64, [f64; N])> {
+        let Row { a, b, c } = row;
+        let pc: [f64; N] = std::array::from_fn(|i| inner(&self.p[i], c));
+        let power = 1.0 + inner(c, &pc);
+        if !(power > 0.0 && power.is_finite()) {
+            return None;
+        }
+        let gain: [f64; N] = std::array::from_fn(|i| inner(&a[i], &pc) / power);
+        // It is symmetric.
+        let ap: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| inner(&a[i], &self.p[j])));
+        for i in 0..N {
+            for j in 0..=i {
+                let next = inner(&ap[i], &a[j]) + self.variance * b[i] * b[j] - power * gain[i] * gain[j];
+                (self.p[i][j], self.p[j][i]) = (next, next);
+            }
+        }
+        Some((power, gain))
+    }
+}
+
+/// Calls a function of a course for the number of its states; `None` where these are more than are taken.
+macro_rules! of_size {
+    ($states:expr, $of:ident($($argument:expr),*)) => {
+        match $states {
+            1 => $of::<1>($($argument),*),
+            2 => $of::<2>($($argument),*),
+            3 => $of::<3>($($argument),*),
+            4 => $of::<4>($($argument),*),
+            5 => $of::<5>($($argument),*),
+            6 => $of::<6>($($argument),*),
+            7 => $of::<7>($($argument),*),
+            8 => $of::<8>($($argument),*),
+            9 => $of::<9>($($argument),*),
+            10 => $of::<10>($($argument),*),
+            _ => None,
+        }
+    };
+}
+
+/// Product of powers beyond which its logarithm is taken.
+const LARGE: f64 = 1e100;
+
+/// Sum of squares of the scaled innovations of stretches, and of the logarithms of their standard deviations.
+fn innovations_of<const N: usize>(course: &Course, variance: f64, stretches: &[Vec<f64>]) -> Option<(f64, f64)> {
+    let (mut squares, mut logs, mut powers) = (0.0, 0.0, 1.0_f64);
+    for (run, e) in stretches.iter().enumerate() {
+        let (mut x, mut riccati) = ([0.0; N], course.begun::<N>(variance));
+        for (row, e) in course.rows_of::<N>(run).zip(e) {
+            let (power, gain) = riccati.next(&row)?;
+            let innovation = e - inner(&row.c, &x);
+            squares += innovation * innovation / power;
+            powers *= power;
+            if powers > LARGE {
+                logs += powers.ln();
+                powers = 1.0;
+            }
+            x = std::array::from_fn(|i| inner(&row.a[i], &x) + gain[i] * innovation);
+        }
+    }
+    Some((squares, 0.5 * (logs + powers.ln())))
+}
+
+/// Standard deviation of each row's innovation, and its gain, by run.
+type Gains = (Vec<Vec<f64>>, Vec<Vec<f64>>);
+
+/// The gains of a course.
+fn gains_of<const N: usize>(course: &Course, variance: f64) -> Option<Gains> {
+    let runs = 0..course.runs.len();
+    let (mut sigmas, mut gains) = (vec![Vec::new(); runs.len()], vec![Vec::new(); runs.len()]);
+    for run in runs {
+        let mut riccati = course.begun::<N>(variance);
+        for row in course.rows_of::<N>(run) {
+            let (power, gain) = riccati.next(&row)?;
+            sigmas[run].push(power.sqrt());
+            gains[run].extend(gain);
+        }
+    }
+    Some((sigmas, gains))
 }
 
 /// The filter of a course, for noise of the sensor with innovations of unit variance.
@@ -140,21 +228,7 @@ impl Moved {
 
     /// Sum of squares of the scaled innovations of stretches, and of the logarithms of their standard deviations, under a force of this variance.
     pub(in crate::evidence) fn innovations(&self, variance: f64, stretches: &[Vec<f64>]) -> Option<(f64, f64)> {
-        let (mut squares, mut log) = (0.0, 0.0);
-        let n = self.0.states;
-        let (mut x, mut next) = (vec![0.0; n], vec![0.0; n]);
-        for (run, e) in stretches.iter().enumerate() {
-            x.fill(0.0);
-            let mut rows = e.iter();
-            self.0.filter(run, variance, |a, c, sigma, gain| {
-                let innovation = rows.next().map_or(0.0, |e| e - dot(c, &x));
-                squares += (innovation / sigma).powi(2);
-                log += sigma.ln();
-                step(a, &x, gain, innovation, &mut next);
-                std::mem::swap(&mut x, &mut next);
-            })?;
-        }
-        Some((squares, log))
+        of_size!(self.0.states, innovations_of(&self.0, variance, stretches))
     }
 
     /// The variance that a force of unit variance gives the output, without what the rows before tell of it, at each row of each run.
@@ -180,14 +254,7 @@ impl Moved {
 
     /// The filter for a force of this variance.
     pub(in crate::evidence) fn filter(self, variance: f64) -> Option<MovingFilter> {
-        let runs = 0..self.0.runs.len();
-        let (mut sigmas, mut gains) = (vec![Vec::new(); runs.len()], vec![Vec::new(); runs.len()]);
-        for run in runs {
-            self.0.filter(run, variance, |_, _, sigma, gain| {
-                sigmas[run].push(sigma);
-                gains[run].extend_from_slice(gain);
-            })?;
-        }
+        let (sigmas, gains) = of_size!(self.0.states, gains_of(&self.0, variance))?;
         Some(MovingFilter { course: self.0, sigmas, gains })
     }
 }

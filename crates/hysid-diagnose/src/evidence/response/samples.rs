@@ -63,7 +63,7 @@ pub fn swaying(n: usize) -> Course {
 /// The mean of that.
 pub fn still() -> ForcePath {
     let (a, b) = (DMatrix::from_row_slice(2, 2, &[0.9, 0.2, -0.3, 0.85]), DVector::from_vec(vec![0.02, 0.1]));
-    ForcePath { a, b, c: DVector::from_vec(vec![1.0, 0.1]), course: None }
+    ForcePath { entry: 1, a, b, c: DVector::from_vec(vec![1.0, 0.1]), course: None }
 }
 
 /// How each of `n` rows of the output answers to a unit force at each.
