@@ -203,6 +203,14 @@ impl NoiseModel {
         matches!(self.kind, Kind::Driven(_))
     }
 
+    /// The state in whose derivative a force enters that the machine answers differently along its motion; `None` where there is no such force.
+    pub fn moving_from(&self) -> Option<usize> {
+        match &self.kind {
+            Kind::Driven(driven) => driven.moving_from(),
+            Kind::Shaped(..) => None,
+        }
+    }
+
     /// Standard deviation of the sensor's noise beside that of a force through the plant; `None` where there is no such force.
     pub fn beside_a_force(&self) -> Option<f64> {
         match &self.kind {

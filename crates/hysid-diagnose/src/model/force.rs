@@ -37,8 +37,8 @@ pub fn pushed(simulation: &Simulation) -> Vec<String> {
     names
 }
 
-/// The noise of what a simulation leaves, with the ways of a force to its outputs: row by row along its trajectory where that was asked for and the equations
-/// answer a force differently along it.
+/// The noise of what a simulation leaves, with the ways of a force to its outputs: row by row along its trajectory where the noise is that of such a force, which
+/// the equations answer differently along it.
 pub fn noise_of(
     model: &Model<'_>,
     theta: &[f64],
@@ -59,11 +59,16 @@ pub fn noise_of(
     };
     let noise = layout.fit_noise_along(residual, MAX_AR, &paths, course);
     let asked = asked.into_inner();
-    let with = |output: usize, (way, path): (usize, &ForcePath)| {
-        path.clone().along(asked.get(&(output, way)).cloned().flatten())
+    // A course takes as much memory as a few tangents: that of the noise itself is kept.
+    let kept = |output: usize, (way, path): (usize, ForcePath)| {
+        let own = noise.models[output].moving_from() == Some(path.entry());
+        let course = asked.get(&(output, way)).filter(|_| own).cloned().flatten();
+        path.along(course)
     };
-    let paths = paths.iter().enumerate().map(|(o, ways)| ways.iter().enumerate().map(|path| with(o, path)).collect());
-    (noise, paths.collect())
+    let of_output =
+        |(output, ways): (usize, Vec<ForcePath>)| ways.into_iter().enumerate().map(|path| kept(output, path)).collect();
+    let paths = paths.into_iter().enumerate().map(of_output).collect();
+    (noise, paths)
 }
 
 /// The equations at instants of a simulation, and the states at which a force may enter.

@@ -48,7 +48,7 @@ impl Found {
 #[derive(Clone, Copy)]
 struct Way<'a> {
     path: &'a ForcePath,
-    course: Option<&'a Course>,
+    course: Option<&'a Arc<Course>>,
     stretches: &'a [&'a [f64]],
     /// Rows of the longest stretch.
     rows: usize,
@@ -56,7 +56,8 @@ struct Way<'a> {
 
 impl Driven {
     /// The process noise of these stretches of one residual by this way, with its log likelihood; colours where they pay `price` for each coefficient,
-    /// looked for where a white one comes near the likelihood `most` of another model. The `course` from row to row is asked for where the mean way does.
+    /// looked for where a white one comes near the likelihood `most` of another model. The `course` from row to row is asked for where the best by the mean way comes
+    /// near it.
     pub fn fit(
         path: &ForcePath,
         course: impl FnOnce() -> Option<Arc<Course>>,
@@ -68,7 +69,7 @@ impl Driven {
         let mean = Way { path, course: None, stretches, rows };
         let found = mean.best(price, most, 0.0)?;
         let course = if found.likelihood < most - HOPELESS { None } else { course() };
-        let along = course.as_deref().and_then(|course| {
+        let along = course.as_ref().and_then(|course| {
             let way = Way { course: Some(course), ..mean };
             // Where the way matters, the share and the colours by the mean one do better along it already, or a smaller share: what shows much here and there
             // the mean way takes for much everywhere.
@@ -210,7 +211,7 @@ impl<'a> Way<'a> {
         };
         let rows = self.stretches.iter().map(|s| s.len()).sum::<usize>() as f64;
         let rms = (self.stretches.iter().map(|s| norm2(s)).sum::<f64>() / rows).sqrt();
-        Some(Driven { filter, moving, colours, sigma, rms })
+        Some(Driven { filter, moving, entry: self.path.entry(), colours, sigma, rms })
     }
 }
 

@@ -18,6 +18,8 @@ pub struct Driven {
     filter: Filter,
     /// That of the rows it was fitted to, where the machine answers a force differently along its motion. Elsewhere the mean way holds.
     moving: Option<Arc<MovingFilter>>,
+    /// The state in whose derivative the force enters.
+    entry: usize,
     colours: Colours,
     /// Standard deviation of the innovations of the sensor's noise.
     sigma: f64,
@@ -49,6 +51,11 @@ impl Driven {
     /// Standard deviation of what it was fitted to.
     pub fn noise_rms(&self) -> f64 {
         self.rms
+    }
+
+    /// The state in whose derivative a force enters that the machine answers differently along its motion.
+    pub fn moving_from(&self) -> Option<usize> {
+        self.moving.as_ref().map(|_| self.entry)
     }
 
     /// The filter of a run of so many rows along its motion, where that is the one it was fitted to.
@@ -174,7 +181,7 @@ mod tests {
             let moving = path
                 .course()
                 .map(|course| Arc::new(Moved::new(&course, colours, &[&e]).unwrap().filter(variance).unwrap()));
-            let noise = Driven { filter, moving, colours, sigma, rms: 1.0 };
+            let noise = Driven { filter, moving, entry: path.entry(), colours, sigma, rms: 1.0 };
             let factor = covariance(&answers(path, n), variance, colours).cholesky().unwrap().l() * sigma;
             let near = |a: &[f64], b: &DVector<f64>| a.iter().zip(b.iter()).all(|(a, b)| (a - b).abs() < 1e-6);
             let column = DVector::from_column_slice(&e);

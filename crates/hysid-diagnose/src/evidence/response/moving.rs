@@ -7,6 +7,8 @@
 //! Reference: B. D. O. Anderson, J. B. Moore, Optimal Filtering, Prentice-Hall (1979), sec. 3.1 (the filter of a system that varies with time) and 5.3 (its
 //! innovations).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
 
 use super::{Colours, dot_short as dot};
@@ -54,11 +56,11 @@ impl Course {
 
     /// The same for noises of these colours: a force with a memory is a state of its own, and so is the last output without the noise of a sensor that has one,
     /// from whose differences it is taken.
-    fn coloured(&self, colours: Colours) -> Self {
+    fn coloured(self: &Arc<Self>, colours: Colours) -> Arc<Self> {
         let n = self.states;
         let (of_force, of_sensor) = (usize::from(colours.force != 0.0), usize::from(colours.sensor != 0.0));
         if of_force + of_sensor == 0 {
-            return self.clone();
+            return Arc::clone(self);
         }
         let states = n + of_force + of_sensor;
         let longer = |run: usize| {
@@ -85,7 +87,7 @@ impl Course {
             rows
         };
         let remembered = (of_force > 0).then_some(n);
-        Self { states, remembered, runs: (0..self.runs.len()).map(longer).collect() }
+        Arc::new(Self { states, remembered, runs: (0..self.runs.len()).map(longer).collect() })
     }
 
     /// The rows of a run by arrays.
@@ -210,18 +212,18 @@ fn gains_of<const N: usize>(course: &Course, variance: f64) -> Option<Gains> {
 /// The filter of a course, for noise of the sensor with innovations of unit variance.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::evidence) struct MovingFilter {
-    course: Course,
+    course: Arc<Course>,
     /// Standard deviation of each row's innovation, and what it adds to the predicted state.
     sigmas: Vec<Vec<f64>>,
     gains: Vec<Vec<f64>>,
 }
 
 /// A course with noises of some colours.
-pub(in crate::evidence) struct Moved(Course);
+pub(in crate::evidence) struct Moved(Arc<Course>);
 
 impl Moved {
     /// `None` where the course has other runs than these stretches.
-    pub(in crate::evidence) fn new(course: &Course, colours: Colours, stretches: &[&[f64]]) -> Option<Self> {
+    pub(in crate::evidence) fn new(course: &Arc<Course>, colours: Colours, stretches: &[&[f64]]) -> Option<Self> {
         let rows = stretches.iter().enumerate().all(|(run, s)| course.rows(run) == s.len());
         (rows && course.runs.len() == stretches.len()).then(|| Self(course.coloured(colours)))
     }
@@ -322,7 +324,7 @@ mod tests {
         let row: Vec<f64> = path.a.transpose().iter().chain(path.b.iter()).chain(path.c.iter()).copied().collect();
         let n = 2000;
         let e = simulated(&path, &white(n, 1), 20.0, 2);
-        let course = Course::new(2, vec![row.repeat(n)]).unwrap();
+        let course = Arc::new(Course::new(2, vec![row.repeat(n)]).unwrap());
         for colours in [Colours::WHITE, Colours { force: 0.8, sensor: 0.0 }, Colours { force: 0.0, sensor: 0.6 }] {
             let filter = Moved::new(&course, colours, &[&e]).unwrap().filter(400.0).unwrap();
             let settled = Filter::new(&path, colours, 400.0, n).unwrap();
@@ -340,7 +342,7 @@ mod tests {
 
     #[test]
     fn a_course_has_the_rows_of_its_stretches_or_none() {
-        let course = swaying(2);
+        let course = Arc::new(swaying(2));
         let e = vec![0.0; 5];
         assert!(Moved::new(&course, Colours::WHITE, &[&e[..2]]).is_some());
         assert!(Moved::new(&course, Colours::WHITE, &[&e]).is_none());
