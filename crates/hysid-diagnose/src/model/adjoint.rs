@@ -54,9 +54,7 @@ impl Model<'_> {
             let mut score = vec![vec![vec![0.0; stretch.len()]; inputs]; sums];
             let mut costate = DMatrix::<f64>::zeros(n, sums);
             for (k, v) in pull.iter().enumerate().rev() {
-                let x: Vec<f64> = response.states.iter().map(|s| s[k]).collect();
-                let u: Vec<f64> = stretch.drive.inputs().iter().map(|s| s[k]).collect();
-                let here = self.compiled.linearise(&parameters, &x, &u);
+                let here = self.beside(&parameters, stretch, response, k);
                 let b = DMatrix::from_row_slice(n, inputs, &here.b);
                 let c = DMatrix::from_row_slice(outputs, n, &here.c);
                 let d = DMatrix::from_row_slice(outputs, inputs, &here.d);

@@ -78,10 +78,8 @@ impl Along {
         let period_s = data.row_period_s();
         let stretches = data.stretches.par_iter().zip(&responses).map(|(stretch, response)| {
             let at = |row: usize| {
-                let n = (row * data.step + data.step / 2).min(stretch.len() - 1);
-                let x: Vec<f64> = response.states.iter().map(|s| s[n]).collect();
-                let u: Vec<f64> = stretch.drive.inputs().iter().map(|s| s[n]).collect();
-                model.compiled.linearise(&parameters, &x, &u)
+                let middle = (row * data.step + data.step / 2).min(stretch.len() - 1);
+                model.beside(&parameters, stretch, response, middle)
             };
             let points: Vec<Linearisation> = (0..stretch.len().div_ceil(data.step)).map(at).collect();
             let steps = (0..points.len()).map(|row| {

@@ -14,10 +14,12 @@ pub mod hypothesis;
 mod predicting;
 mod unknowns;
 
-use hysid_plant::{Compiled, Direction, Initial, Observer, Run, Sensitivity, Simulation, Start};
+use hysid_plant::{
+    Compiled, Direction, Initial, Linearisation, Observer, Response, Run, Sensitivity, Simulation, Start,
+};
 use rayon::prelude::*;
 
-use crate::data::DataSet;
+use crate::data::{DataSet, Stretch};
 use crate::refit::Problem;
 pub use along::along;
 use predicting::Corrections;
@@ -133,9 +135,9 @@ impl<'d> Model<'d> {
     }
 
     /// Outputs and states of every stretch.
-    pub fn responses(&self, theta: &[f64]) -> (Vec<hysid_plant::Response>, Option<(usize, usize)>) {
+    pub fn responses(&self, theta: &[f64]) -> (Vec<Response>, Option<(usize, usize)>) {
         let parameters = self.parameters(theta, &[]);
-        let responses: Vec<hysid_plant::Response> = (0..self.data.stretches.len())
+        let responses: Vec<Response> = (0..self.data.stretches.len())
             .map(|s| {
                 let start = self.start_of(s, theta);
                 self.compiled.simulate(&self.run_of(s, &parameters, &start))
@@ -253,7 +255,7 @@ impl<'d> Model<'d> {
     }
 
     /// The equations linearised at `instants` of the stretches, evenly spread over all samples; empty where the run diverges.
-    pub fn linearised(&self, theta: &[f64], instants: usize) -> Vec<hysid_plant::Linearisation> {
+    pub fn linearised(&self, theta: &[f64], instants: usize) -> Vec<Linearisation> {
         let (responses, diverged) = self.responses(theta);
         let all = self.data.samples();
         if diverged.is_some() || all == 0 {
@@ -268,11 +270,16 @@ impl<'d> Model<'d> {
                     n -= if here { 0 } else { s.len() };
                     here
                 })?;
-                let x: Vec<f64> = response.states.iter().map(|s| s[n]).collect();
-                let u: Vec<f64> = stretch.drive.inputs().iter().map(|s| s[n]).collect();
-                Some(self.compiled.linearise(&parameters, &x, &u))
+                Some(self.beside(&parameters, stretch, response, n))
             })
             .collect()
+    }
+
+    /// The equations linearised at a sample of a stretch's response, with these parameters (in the document's order).
+    fn beside(&self, parameters: &[f64], stretch: &Stretch, response: &Response, sample: usize) -> Linearisation {
+        let x: Vec<f64> = response.states.iter().map(|s| s[sample]).collect();
+        let u: Vec<f64> = stretch.drive.inputs().iter().map(|s| s[sample]).collect();
+        self.compiled.linearise(parameters, &x, &u)
     }
 
     /// The simulation with these values in it (initial values stay as the document has them).

@@ -52,6 +52,8 @@ struct Way<'a> {
     stretches: &'a [&'a [f64]],
     /// Rows of the longest stretch.
     rows: usize,
+    /// The output's variance for a white force of unit variance.
+    white: f64,
 }
 
 impl Driven {
@@ -65,8 +67,7 @@ impl Driven {
         price: f64,
         most: f64,
     ) -> Option<(Self, f64)> {
-        let rows = stretches.iter().map(|s| s.len()).max()?;
-        let mean = Way { path, course: None, stretches, rows };
+        let mean = Way::mean(path, stretches)?;
         let found = mean.best(price, most, 0.0)?;
         let course = if found.likelihood < most - HOPELESS { None } else { course() };
         let along = course.as_ref().and_then(|course| {
@@ -87,18 +88,22 @@ impl Driven {
 
     /// Whether a little of a white force is likelier than the likelihood `most` of a model without one.
     pub fn hinted(path: &ForcePath, stretches: &[&[f64]], most: f64) -> bool {
-        let Some(rows) = stretches.iter().map(|s| s.len()).max() else { return false };
-        let way = Way { path, course: None, stretches, rows };
-        let likelihood = way.likelihood(Colours::WHITE);
+        let way = Way::mean(path, stretches);
+        let likelihood = way.as_ref().and_then(|way| way.likelihood(Colours::WHITE));
         likelihood.is_some_and(|at| HINTS.into_iter().any(|share| at(share.log10()).is_some_and(|(l, _)| l > most)))
     }
 }
 
 impl<'a> Way<'a> {
+    /// The mean way; `None` where nothing finite passes.
+    fn mean(path: &'a ForcePath, stretches: &'a [&'a [f64]]) -> Option<Self> {
+        let rows = stretches.iter().map(|s| s.len()).max()?;
+        Some(Self { path, course: None, stretches, rows, white: unit(path, 0.0, rows)? })
+    }
+
     /// The output's variance for a force of unit variance and this pole; `None` where nothing finite passes.
     fn unit(&self, pole: f64) -> Option<f64> {
-        let unit = self.path.variance(pole, self.rows.min(SCALE_ROWS));
-        (unit > 0.0 && unit.is_finite()).then_some(unit)
+        if pole == 0.0 { Some(self.white) } else { unit(self.path, pole, self.rows) }
     }
 
     /// The stretches, each less what the sensor's noise before tells of it.
@@ -213,6 +218,12 @@ impl<'a> Way<'a> {
         let rms = (self.stretches.iter().map(|s| norm2(s)).sum::<f64>() / rows).sqrt();
         Some(Driven { filter, moving, entry: self.path.entry(), colours, sigma, rms })
     }
+}
+
+/// The output's variance by a path for a force of unit variance and this pole, after so many rows; `None` where nothing finite passes.
+fn unit(path: &ForcePath, pole: f64, rows: usize) -> Option<f64> {
+    let unit = path.variance(pole, rows.min(SCALE_ROWS));
+    (unit > 0.0 && unit.is_finite()).then_some(unit)
 }
 
 /// The decade at which a log likelihood is highest, from a first one on by steps that shrink; `at` gives it with what comes with it.

@@ -31,7 +31,36 @@ impl Colours {
 
     /// Number of coefficients: the share of the force, and each pole.
     pub fn coefficients(self) -> usize {
-        1 + [self.force, self.sensor].into_iter().filter(|pole| *pole != 0.0).count()
+        1 + self.states()
+    }
+
+    /// Number of states of noises with a memory.
+    fn states(self) -> usize {
+        [self.force, self.sensor].into_iter().filter(|pole| *pole != 0.0).count()
+    }
+
+    /// Appends matrix (by rows), force and output of a row to `rows`, with noises of these colours: a force with a memory is a state of its own, and so is the last
+    /// output without the noise of a sensor that has one, from whose differences it is taken.
+    fn extend(self, (a, b, c): (&[f64], &[f64], &[f64]), rows: &mut Vec<f64>) {
+        let n = c.len();
+        let states = n + self.states();
+        let row = rows.len();
+        rows.resize(row + states * (states + 2), 0.0);
+        let (matrix, rest) = rows[row..].split_at_mut(states * states);
+        let (force, output) = rest.split_at_mut(states);
+        matrix.chunks_exact_mut(states).zip(a.chunks_exact(n)).for_each(|(to, a)| to[..n].copy_from_slice(a));
+        if self.force == 0.0 {
+            force[..n].copy_from_slice(b);
+        } else {
+            (0..n).for_each(|i| matrix[i * states + n] = b[i]);
+            matrix[n * states + n] = self.force;
+            force[n] = (1.0 - self.force * self.force).sqrt();
+        }
+        output[..n].copy_from_slice(c);
+        if self.sensor != 0.0 {
+            matrix[(states - 1) * states..][..n].copy_from_slice(c);
+            output[states - 1] = -self.sensor;
+        }
     }
 }
 
@@ -48,6 +77,7 @@ pub struct ForcePath {
 }
 
 /// Inner product of a few numbers.
+#[inline]
 fn dot_short(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -117,24 +147,13 @@ impl ForcePath {
         self.course.clone()
     }
 
-    /// Matrix and output of the way with noises of these colours: a force with a memory is a state of its own, and so is the last output without the noise of a
-    /// sensor that has one, from whose differences it is taken.
+    /// Matrix and output of the way with noises of these colours.
     fn coloured(&self, colours: Colours) -> (DMatrix<f64>, DVector<f64>) {
-        let n = self.c.len();
-        let (mut a, mut c) = (self.a.clone(), self.c.clone());
-        if colours.force != 0.0 {
-            a = a.resize(n + 1, n + 1, 0.0);
-            a.view_mut((0, n), (n, 1)).copy_from(&self.b);
-            a[(n, n)] = colours.force;
-            c = c.resize_vertically(n + 1, 0.0);
-        }
-        if colours.sensor != 0.0 {
-            let n = c.len();
-            a = a.resize(n + 1, n + 1, 0.0);
-            a.view_mut((n, 0), (1, n)).copy_from(&c.transpose());
-            c = c.push(-colours.sensor);
-        }
-        (a, c)
+        let states = self.c.len() + colours.states();
+        let mut row = Vec::new();
+        colours.extend((self.a.transpose().as_slice(), self.b.as_slice(), self.c.as_slice()), &mut row);
+        let (a, rest) = row.split_at(states * states);
+        (DMatrix::from_row_slice(states, states, a), DVector::from_row_slice(&rest[states..]))
     }
 
     /// Variance of the output, `rows` rows from the start, for a force of unit variance that begins at zero.

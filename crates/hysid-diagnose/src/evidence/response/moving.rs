@@ -54,39 +54,19 @@ impl Course {
         })
     }
 
-    /// The same for noises of these colours: a force with a memory is a state of its own, and so is the last output without the noise of a sensor that has one,
-    /// from whose differences it is taken.
+    /// The same for noises of these colours.
     fn coloured(self: &Arc<Self>, colours: Colours) -> Arc<Self> {
-        let n = self.states;
-        let (of_force, of_sensor) = (usize::from(colours.force != 0.0), usize::from(colours.sensor != 0.0));
-        if of_force + of_sensor == 0 {
+        if colours == Colours::WHITE {
             return Arc::clone(self);
         }
-        let states = n + of_force + of_sensor;
+        let n = self.states;
+        let states = n + colours.states();
         let longer = |run: usize| {
             let mut rows = Vec::with_capacity(self.rows(run) * Self::width(states));
-            for (a, b, c) in self.steps(run) {
-                let row = rows.len();
-                rows.resize(row + Self::width(states), 0.0);
-                let (matrix, rest) = rows[row..].split_at_mut(states * states);
-                let (force, output) = rest.split_at_mut(states);
-                matrix.chunks_exact_mut(states).zip(a.chunks_exact(n)).for_each(|(to, a)| to[..n].copy_from_slice(a));
-                if of_force > 0 {
-                    (0..n).for_each(|i| matrix[i * states + n] = b[i]);
-                    matrix[n * states + n] = colours.force;
-                    force[n] = (1.0 - colours.force * colours.force).sqrt();
-                } else {
-                    force[..n].copy_from_slice(b);
-                }
-                output[..n].copy_from_slice(c);
-                if of_sensor > 0 {
-                    matrix[(states - 1) * states..][..n].copy_from_slice(c);
-                    output[states - 1] = -colours.sensor;
-                }
-            }
+            self.steps(run).for_each(|row| colours.extend(row, &mut rows));
             rows
         };
-        let remembered = (of_force > 0).then_some(n);
+        let remembered = (colours.force != 0.0).then_some(n);
         Arc::new(Self { states, remembered, runs: (0..self.runs.len()).map(longer).collect() })
     }
 
@@ -116,11 +96,6 @@ struct Row<const N: usize> {
     c: [f64; N],
 }
 
-/// Inner product of a few numbers.
-fn inner<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    (0..N).map(|i| a[i] * b[i]).sum()
-}
-
 /// The covariance of the predicted state, for noise of the sensor with unit variance.
 struct Riccati<const N: usize> {
     p: [[f64; N]; N],
@@ -131,17 +106,17 @@ impl<const N: usize> Riccati<N> {
     /// Power and gain of a row's innovation, and the covariance of the next row; `None` where that is not finite.
     fn next(&mut self, row: &Row<N>) -> Option<(f64, [f64; N])> {
         let Row { a, b, c } = row;
-        let pc: [f64; N] = std::array::from_fn(|i| inner(&self.p[i], c));
-        let power = 1.0 + inner(c, &pc);
+        let pc: [f64; N] = std::array::from_fn(|i| dot(&self.p[i], c));
+        let power = 1.0 + dot(c, &pc);
         if !(power > 0.0 && power.is_finite()) {
             return None;
         }
-        let gain: [f64; N] = std::array::from_fn(|i| inner(&a[i], &pc) / power);
+        let gain: [f64; N] = std::array::from_fn(|i| dot(&a[i], &pc) / power);
         // It is symmetric.
-        let ap: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| inner(&a[i], &self.p[j])));
+        let ap: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| dot(&a[i], &self.p[j])));
         for i in 0..N {
             for j in 0..=i {
-                let next = inner(&ap[i], &a[j]) + self.variance * b[i] * b[j] - power * gain[i] * gain[j];
+                let next = dot(&ap[i], &a[j]) + self.variance * b[i] * b[j] - power * gain[i] * gain[j];
                 (self.p[i][j], self.p[j][i]) = (next, next);
             }
         }
@@ -178,14 +153,14 @@ fn innovations_of<const N: usize>(course: &Course, variance: f64, stretches: &[V
         let (mut x, mut riccati) = ([0.0; N], course.begun::<N>(variance));
         for (row, e) in course.rows_of::<N>(run).zip(e) {
             let (power, gain) = riccati.next(&row)?;
-            let innovation = e - inner(&row.c, &x);
+            let innovation = e - dot(&row.c, &x);
             squares += innovation * innovation / power;
             powers *= power;
             if powers > LARGE {
                 logs += powers.ln();
                 powers = 1.0;
             }
-            x = std::array::from_fn(|i| inner(&row.a[i], &x) + gain[i] * innovation);
+            x = std::array::from_fn(|i| dot(&row.a[i], &x) + gain[i] * innovation);
         }
     }
     Some((squares, 0.5 * (logs + powers.ln())))
