@@ -1,10 +1,13 @@
 //! How samples are stacked into rows, and the whitening of such a stack.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::common::CommonForce;
 use super::noise::NoiseModel;
-use super::response::{Course, ForcePath};
+use super::projector::norm2;
+use super::response::{CommonPath, Course, ForcePath, ForcePaths};
 use super::shared::Shared;
 
 /// A run of rows that follow each other in time: one output of one stretch, between gaps.
@@ -56,30 +59,65 @@ impl Layout {
         })
     }
 
-    /// One noise model for each output, fitted to this stacked residual, with what they share (neither colour nor that for an order of 0); `paths[output]` are the
-    /// ways of an unknown force to it, where there are any.
-    pub fn fit_noise(&self, residual: &[f64], max_order: usize, paths: &[Vec<ForcePath>]) -> Whitener {
-        self.fit_noise_along(residual, max_order, paths, |output, way| paths[output][way].course())
+    /// The runs that all of these outputs recorded: one series of each, in their order.
+    pub fn together(&self, outputs: impl IntoIterator<Item = usize, IntoIter: Clone>) -> Vec<Vec<&Series>> {
+        let outputs = outputs.into_iter();
+        let Some(first) = outputs.clone().next() else { return Vec::new() };
+        let beside = |run: &Series, o: usize| self.series.iter().find(|s| s.output == o && s.is_beside(run));
+        let of_first = self.series.iter().filter(|s| s.output == first);
+        of_first.filter_map(|run| outputs.clone().map(|o| beside(run, o)).collect()).collect()
     }
 
-    /// The same with courses of the ways, by output and place among them, that are made where they are asked for.
+    /// White noise of each output, as large as this stacked residual.
+    pub fn white_noise(&self, residual: &[f64]) -> Whitener {
+        self.fit_noise(residual, 0, &ForcePaths::default())
+    }
+
+    /// The noise of this stacked residual: a model for each output, or one force that several have in common, with what they share (neither colour nor that for an
+    /// order of 0), by the ways of an unknown force to them, where there are any.
+    pub fn fit_noise(&self, residual: &[f64], max_order: usize, paths: &ForcePaths) -> Whitener {
+        let common = |entry: usize| paths.common.iter().find(|path| path.entry() == entry).cloned();
+        self.fit_noise_along(residual, max_order, &paths.each, |output, way| paths.each[output][way].course(), common)
+    }
+
+    /// The same with courses of the ways, by output and place among them, and with the common way of a force at a state, that are made where they are asked for.
     pub fn fit_noise_along(
         &self,
         residual: &[f64],
         max_order: usize,
         paths: &[Vec<ForcePath>],
         course: impl Fn(usize, usize) -> Option<Arc<Course>>,
+        common: impl Fn(usize) -> Option<CommonPath>,
     ) -> Whitener {
-        let models = (0..self.outputs)
+        let models: Vec<NoiseModel> = (0..self.outputs)
             .map(|o| {
                 let stretches: Vec<&[f64]> =
                     self.series.iter().filter(|s| s.output == o).map(|s| &residual[s.rows.clone()]).collect();
                 NoiseModel::along(&stretches, max_order, paths.get(o).map_or(&[], Vec::as_slice), |way| course(o, way))
             })
             .collect();
-        let each = Whitener::of(models);
-        let shared = if max_order > 0 { Shared::of(self, &each.apply(self, residual)) } else { None };
-        Whitener { shared, ..each }
+        let shared = |noise: &Whitener| Shared::of(self, &noise.apply(self, residual));
+        let price = 0.5 * (self.len().max(2) as f64).ln();
+        let score = |noise: &Whitener| {
+            let white = noise.apply(self, residual);
+            -0.5 * norm2(&white) - noise.log_scale(self) - price * noise.coefficients() as f64
+        };
+        let mut best = Whitener::of(models);
+        if max_order > 0 {
+            best.shared = shared(&best);
+        }
+        let entries: BTreeSet<usize> = best.models.iter().filter_map(|m| Some(m.driven()?.entry)).collect();
+        for path in entries.into_iter().filter_map(common) {
+            let fitted = CommonForce::fit(&path, self, residual, &best.models, price);
+            let with = |common: CommonForce| {
+                let alone = Whitener { common: Some((common.clone(), None)), ..best.clone() };
+                Whitener { common: Some((common, shared(&alone))), ..alone }
+            };
+            if let Some(with) = fitted.map(with).filter(|with| score(with) > score(&best)) {
+                best = with;
+            }
+        }
+        best
     }
 
     /// Root mean square of each output's rows of a stack.
@@ -97,19 +135,30 @@ impl Layout {
     }
 }
 
-/// The noise of the outputs: the model of each, and what they share.
+/// By what the series of a layout are whitened.
+struct Parts<'a> {
+    /// Those that models of their own whiten, each after its place among those of its output.
+    alone: Vec<(usize, &'a Series)>,
+    /// A force in common, with its runs.
+    common: Option<(&'a CommonForce, Vec<Vec<&'a Series>>)>,
+    shared: Option<&'a Shared>,
+}
+
+/// The noise of the outputs: the model of each, a force that several have in common, and what they share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitener {
     /// In the order of the outputs.
     pub models: Vec<NoiseModel>,
-    /// What the whitened outputs still share.
+    /// What they still share, whitened so.
     shared: Option<Shared>,
+    /// A force that is in several of them, in the place of their own models, and what they share beside it.
+    common: Option<(CommonForce, Option<Shared>)>,
 }
 
 impl Whitener {
     /// Of outputs that share no noise.
     pub fn of(models: Vec<NoiseModel>) -> Self {
-        Self { models, shared: None }
+        Self { models, common: None, shared: None }
     }
 
     /// The stack, each series whitened by its output's model.
@@ -121,36 +170,65 @@ impl Whitener {
 
     /// As [`Whitener::apply`], into a buffer of the same length.
     pub fn apply_into(&self, layout: &Layout, stack: &[f64], out: &mut [f64]) {
-        for (run, s) in layout.runs() {
+        let Parts { alone, common, shared } = self.parts(layout);
+        for (run, s) in alone {
             self.models[s.output].whiten(run, &stack[s.rows.clone()], &mut out[s.rows.clone()]);
         }
-        if let Some(shared) = &self.shared {
+        if let Some((common, runs)) = common {
+            common.whiten(&runs, stack, out);
+        }
+        if let Some(shared) = shared {
             shared.take_out(layout, out);
         }
     }
 
     /// The transpose of [`Whitener::apply`], in place.
     pub fn transpose(&self, layout: &Layout, stack: &mut [f64]) {
-        if let Some(shared) = &self.shared {
+        let Parts { alone, common, shared } = self.parts(layout);
+        if let Some(shared) = shared {
             shared.transpose(layout, stack);
         }
-        for (run, s) in layout.runs() {
+        for (run, s) in alone {
             self.models[s.output].transpose(run, &mut stack[s.rows.clone()]);
+        }
+        if let Some((common, runs)) = common {
+            common.transpose(&runs, stack);
         }
     }
 
-    /// The same for rows of another motion than that it was fitted to: what a force makes there is known by the mean of its ways.
+    /// The same for rows of another motion than that it was fitted to: what a force makes there is known by the mean of its ways, in each output by itself.
     pub fn elsewhere(&self) -> Self {
-        Self { models: self.models.iter().map(NoiseModel::elsewhere).collect(), shared: self.shared.clone() }
+        let models = self.models.iter().map(NoiseModel::elsewhere).collect();
+        Self { models, common: None, shared: self.shared.clone() }
+    }
+
+    /// By what the series of a layout are whitened.
+    fn parts<'a>(&'a self, layout: &'a Layout) -> Parts<'a> {
+        let with =
+            |(common, shared): &'a (CommonForce, Option<Shared>)| Some((common, common.runs(layout)?, shared.as_ref()));
+        let Some((common, runs, shared)) = self.common.as_ref().and_then(with) else {
+            return Parts { alone: layout.runs().collect(), common: None, shared: self.shared.as_ref() };
+        };
+        let alone = layout.runs().filter(|(_, s)| !common.has(s.output)).collect();
+        Parts { alone, common: Some((common, runs)), shared }
+    }
+
+    /// The state in whose derivative a force enters that several outputs have in common.
+    pub fn common_from(&self) -> Option<usize> {
+        self.common.as_ref().map(|(common, _)| common.entry())
     }
 
     /// Colours unit white noise in place: the inverse of [`Whitener::apply`].
     pub fn colour(&self, layout: &Layout, stack: &mut [f64]) {
-        if let Some(shared) = &self.shared {
+        let Parts { alone, common, shared } = self.parts(layout);
+        if let Some(shared) = shared {
             shared.put_in(layout, stack);
         }
-        for (run, s) in layout.runs() {
+        for (run, s) in alone {
             self.models[s.output].colour(run, &mut stack[s.rows.clone()]);
+        }
+        if let Some((common, runs)) = common {
+            common.colour(&runs, stack);
         }
     }
 
@@ -161,14 +239,25 @@ impl Whitener {
 
     /// The share that a series, after its place among those of its output, has in [`Whitener::log_scale`].
     pub fn log_scale_of(&self, layout: &Layout, run: usize, s: &Series) -> f64 {
-        let shared = self.shared.as_ref().map_or(0.0, |shared| shared.log_scale(layout, s));
-        self.models[s.output].log_scale(run, s.rows.len()) + s.rows.len() as f64 * shared
+        let Parts { common, shared, .. } = self.parts(layout);
+        let shared = shared.map_or(0.0, |shared| shared.log_scale(layout, s));
+        let common = common.and_then(|(common, runs)| {
+            let run = runs.iter().position(|run| common.has(s.output) && run.contains(&s))?;
+            Some(common.log_scale(run, s))
+        });
+        common.unwrap_or_else(|| self.models[s.output].log_scale(run, s.rows.len())) + s.rows.len() as f64 * shared
     }
 
     /// Number of coefficients beyond the scales.
     pub fn coefficients(&self) -> usize {
-        let shared = self.shared.as_ref().map_or(0, Shared::coefficients);
-        self.models.iter().map(NoiseModel::coefficients).sum::<usize>() + shared
+        let (common, shared) = match &self.common {
+            Some((common, shared)) => (Some(common), shared.as_ref()),
+            None => (None, self.shared.as_ref()),
+        };
+        let alone = self.models.iter().enumerate().filter(|(o, _)| common.is_none_or(|common| !common.has(*o)));
+        alone.map(|(_, m)| m.coefficients()).sum::<usize>()
+            + common.map_or(0, CommonForce::coefficients)
+            + shared.map_or(0, Shared::coefficients)
     }
 
     /// Whether each output's noise is white, whatever they share.

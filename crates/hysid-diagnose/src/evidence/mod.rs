@@ -11,6 +11,7 @@
 
 mod below;
 mod blocks;
+mod common;
 mod constancy;
 mod driven;
 mod layout;
@@ -29,6 +30,6 @@ pub use layout::{Layout, Series, Whitener};
 pub use noise::NoiseModel;
 pub use projector::{Projector, doubly, norm2};
 pub use quantile::quantile;
-pub use response::{Course, ForcePath, between};
+pub use response::{CommonPath, Course, ForcePath, ForcePaths, between};
 pub use score::{FeatureGroup, INSIDE, detectable_amplitude, score, surprise};
 pub use surrogate::{Contender, SurrogateTest, TestOptions, correlation_time, surrogate_test};

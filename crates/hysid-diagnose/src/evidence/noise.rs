@@ -200,23 +200,25 @@ impl NoiseModel {
 
     /// Whether it is that of a force through the plant.
     pub fn is_driven(&self) -> bool {
-        matches!(self.kind, Kind::Driven(_))
+        self.driven().is_some()
+    }
+
+    /// The force through the plant whose noise it is.
+    pub(super) fn driven(&self) -> Option<&Driven> {
+        match &self.kind {
+            Kind::Driven(driven) => Some(driven),
+            Kind::Shaped(..) => None,
+        }
     }
 
     /// The state in whose derivative a force enters that the machine answers differently along its motion; `None` where there is no such force.
     pub fn moving_from(&self) -> Option<usize> {
-        match &self.kind {
-            Kind::Driven(driven) => driven.moving_from(),
-            Kind::Shaped(..) => None,
-        }
+        self.driven().and_then(Driven::moving_from)
     }
 
     /// Standard deviation of the sensor's noise beside that of a force through the plant; `None` where there is no such force.
     pub fn beside_a_force(&self) -> Option<f64> {
-        match &self.kind {
-            Kind::Driven(driven) => Some(driven.sensor_rms()),
-            Kind::Shaped(..) => None,
-        }
+        self.driven().map(Driven::sensor_rms)
     }
 
     /// The same for rows of another motion than that it was fitted to.

@@ -20,22 +20,11 @@ pub struct Shared {
     factor: DMatrix<f64>,
 }
 
-/// The runs that all outputs recorded: one series for each output, in their order.
-fn complete_runs(layout: &Layout) -> Vec<Vec<&Series>> {
-    let of_first = layout.series.iter().filter(|s| s.output == 0);
-    of_first
-        .filter_map(|first| {
-            let beside = |o: usize| layout.series.iter().find(|s| s.output == o && s.is_beside(first));
-            (0..layout.outputs).map(beside).collect()
-        })
-        .collect()
-}
-
 impl Shared {
     /// Of whitened rows; `None` where there is one output only, or no correlation that pays.
     pub fn of(layout: &Layout, white: &[f64]) -> Option<Self> {
         let m = layout.outputs;
-        let runs = complete_runs(layout);
+        let runs = layout.together(0..layout.outputs);
         let rows: usize = runs.iter().map(|run| run[0].rows.len()).sum();
         if m < 2 || rows == 0 {
             return None;
@@ -86,7 +75,7 @@ impl Shared {
 
     fn each_moment(&self, layout: &Layout, white: &mut [f64], mut change: impl FnMut(&mut [f64])) {
         let mut moment = vec![0.0; layout.outputs];
-        for run in complete_runs(layout) {
+        for run in layout.together(0..layout.outputs) {
             for k in 0..run[0].rows.len() {
                 run.iter().zip(&mut moment).for_each(|(s, w)| *w = white[s.rows.start + k]);
                 change(&mut moment);
@@ -97,7 +86,7 @@ impl Shared {
 
     /// Logarithm of what a row of a series is scaled by.
     pub fn log_scale(&self, layout: &Layout, s: &Series) -> f64 {
-        let complete = complete_runs(layout).iter().any(|run| run[s.output] == s);
+        let complete = layout.together(0..layout.outputs).iter().any(|run| run[s.output] == s);
         if complete { self.factor[(s.output, s.output)].ln() } else { 0.0 }
     }
 

@@ -7,7 +7,7 @@ use hysid_plant::Simulation;
 use super::force::noise_of;
 use super::{Count, Model, Values};
 use crate::data::DataSet;
-use crate::evidence::{ForcePath, Projector, Whitener, norm2};
+use crate::evidence::{ForcePaths, Projector, Whitener, norm2};
 use crate::refit::{Fit, LmOptions, Problem, go_on, levenberg_marquardt};
 
 /// Largest order of the noise models.
@@ -70,7 +70,7 @@ pub struct Base<'d> {
     /// The noise of its residual.
     pub whitener: Whitener,
     /// Ways of an unknown force to each output; none where no noise is coloured.
-    pub paths: Vec<Vec<ForcePath>>,
+    pub paths: ForcePaths,
     /// How many independent rows each row stands for.
     pub share: f64,
     /// Log likelihood of the residual under that noise, less half of `ln n` for each coefficient of the noise model.
@@ -124,10 +124,10 @@ pub fn fit_simulation<'d>(
     let data = model.data();
     let mut noise = match whitener {
         Some(w) if kind == NoiseKind::Coloured || w.coefficients() == 0 => w.clone(),
-        _ => data.layout.fit_noise(&data.about_means(), 0, &[]),
+        _ => data.layout.white_noise(&data.about_means()),
     };
     let mut fit: Option<Fit> = None;
-    let mut paths = Vec::new();
+    let mut paths = ForcePaths::default();
     for _ in 0..rounds.max(1) {
         let f = match (&fit, start) {
             (Some(before), _) | (None, Start::Fit(before)) => {
@@ -139,7 +139,7 @@ pub fn fit_simulation<'d>(
         };
         (noise, paths) = match kind {
             NoiseKind::Coloured => noise_of(&model, &f.theta, &f.residual, pushed),
-            NoiseKind::White(_) => (data.layout.fit_noise(&f.residual, 0, &[]), Vec::new()),
+            NoiseKind::White(_) => (data.layout.white_noise(&f.residual), ForcePaths::default()),
         };
         fit = Some(f);
     }

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::Model;
-use crate::evidence::{Course, between};
+use crate::evidence::{CommonPath, Course, Series, between};
 
 /// Share of its largest size by which a coefficient of the equations changes where they answer differently along the way.
 const CHANGES: f64 = 0.1;
@@ -96,29 +96,46 @@ impl Along {
         Some(Self { stretches, states, step: data.step })
     }
 
-    /// The way from a force at state `entry` to an output, for each of its series; `None` where the force does not reach it.
-    pub fn course(&self, model: &Model<'_>, entry: usize, output: usize) -> Option<Course> {
+    /// The states by which a force at state `entry` reaches what these outputs show, `None` where it does not.
+    fn between(&self, entry: usize, outputs: &[usize]) -> Option<Vec<usize>> {
         let n = self.states;
         let points = || self.stretches.iter().flat_map(|(points, _)| points);
         let moves = |i: usize, j: usize| points().any(|p| p.a[i * n + j] != 0.0);
         let graph: Vec<bool> = (0..n * n).map(|ij| moves(ij / n, ij % n)).collect();
-        let shows = |i: usize| points().any(|p| p.c[output * n + i] != 0.0);
+        let shows = |i: usize| points().any(|p| outputs.iter().any(|output| p.c[output * n + i] != 0.0));
         let kept = between(n, entry, |i, j| graph[i * n + j], shows);
-        kept.contains(&entry).then_some(())?;
+        kept.contains(&entry).then_some(kept)
+    }
+
+    /// The rows of a series: matrix, force at state `entry`, what each of these outputs shows.
+    fn rows(&self, series: &Series, entry: usize, outputs: &[usize], kept: &[usize]) -> Vec<f64> {
+        let (n, (points, steps)) = (self.states, &self.stretches[series.stretch]);
+        let mut rows = Vec::with_capacity(series.rows.len() * kept.len() * (kept.len() + 1 + outputs.len()));
+        for k in 0..series.rows.len() {
+            let at = (series.first / self.step + k).min(steps.len() - 1);
+            let (step, point) = (&steps[at], &points[at]);
+            kept.iter().for_each(|&i| rows.extend(kept.iter().map(|&j| step.flow[(i, j)])));
+            rows.extend(kept.iter().map(|&i| step.held[(i, entry)]));
+            outputs.iter().for_each(|output| rows.extend(kept.iter().map(|&i| point.c[output * n + i])));
+        }
+        rows
+    }
+
+    /// The way from a force at state `entry` to an output, for each of its series; `None` where the force does not reach it.
+    pub fn course(&self, model: &Model<'_>, entry: usize, output: usize) -> Option<Course> {
+        let kept = self.between(entry, &[output])?;
         let of_output = model.data().layout.series.iter().filter(|s| s.output == output);
-        let runs = of_output.map(|series| {
-            let (points, steps) = &self.stretches[series.stretch];
-            let mut rows = Vec::with_capacity(series.rows.len() * kept.len() * (kept.len() + 2));
-            for k in 0..series.rows.len() {
-                let at = (series.first / self.step + k).min(steps.len() - 1);
-                let (step, point) = (&steps[at], &points[at]);
-                kept.iter().for_each(|&i| rows.extend(kept.iter().map(|&j| step.flow[(i, j)])));
-                rows.extend(kept.iter().map(|&i| step.held[(i, entry)]));
-                rows.extend(kept.iter().map(|&i| point.c[output * n + i]));
-            }
-            rows
-        });
-        Course::new(kept.len(), runs.collect())
+        Course::new(kept.len(), of_output.map(|series| self.rows(series, entry, &[output], &kept)).collect())
+    }
+
+    /// The way to all outputs that it reaches, for each run that they recorded together; `None` where these are fewer than two.
+    pub fn common(&self, model: &Model<'_>, entry: usize) -> Option<CommonPath> {
+        let layout = &model.data().layout;
+        let outputs: Vec<usize> = (0..layout.outputs).filter(|&o| self.between(entry, &[o]).is_some()).collect();
+        let kept = self.between(entry, &outputs)?;
+        let runs = layout.together(outputs.iter().copied());
+        let rows = runs.iter().map(|run| (self.rows(run[0], entry, &outputs, &kept), run[0].rows.len()));
+        CommonPath::new(entry, outputs.clone(), kept.len(), rows.collect())
     }
 }
 

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector, Schur};
 use super::Model;
 use super::base::MAX_AR;
 use super::course::{Along, changes};
-use crate::evidence::{Course, ForcePath, Whitener};
+use crate::evidence::{CommonPath, Course, ForcePath, ForcePaths, Whitener};
 use crate::slot::{Place, Structure, Target};
 
 /// Iterations for each state in which eigenvalues are found.
@@ -39,15 +39,11 @@ pub fn pushed(simulation: &Simulation) -> Vec<String> {
 
 /// The noise of what a simulation leaves, with the ways of a force to its outputs: row by row along its trajectory where the noise is that of such a force, which
 /// the equations answer differently along it.
-pub fn noise_of(
-    model: &Model<'_>,
-    theta: &[f64],
-    residual: &[f64],
-    pushed: &[String],
-) -> (Whitener, Vec<Vec<ForcePath>>) {
+pub fn noise_of(model: &Model<'_>, theta: &[f64], residual: &[f64], pushed: &[String]) -> (Whitener, ForcePaths) {
     let layout = &model.data().layout;
     let Some(ways) = Ways::of(model, theta, pushed) else {
-        return (layout.fit_noise(residual, MAX_AR, &[]), Vec::new());
+        let none = ForcePaths::default();
+        return (layout.fit_noise(residual, MAX_AR, &none), none);
     };
     let paths = ways.paths(model);
     let along = LazyCell::new(|| changes(&ways.points).then(|| Along::of(model, theta)).flatten());
@@ -57,7 +53,13 @@ pub fn noise_of(
         let made = || along.as_ref()?.course(model, paths[output][way].entry(), output).map(Arc::new);
         asked.entry((output, way)).or_insert_with(made).clone()
     };
-    let noise = layout.fit_noise_along(residual, MAX_AR, &paths, course);
+    let together = |entry: usize| match along.as_ref() {
+        Some(along) => along.common(model, entry),
+        None => ways.common(model, entry),
+    };
+    let several = |entry: usize| if layout.outputs > 1 { together(entry) } else { None };
+    let noise = layout.fit_noise_along(residual, MAX_AR, &paths, course, several);
+    let common = noise.common_from().and_then(together).into_iter().collect();
     let asked = asked.into_inner();
     // A course takes as much memory as a few tangents: that of the noise itself is kept.
     let kept = |output: usize, (way, path): (usize, ForcePath)| {
@@ -67,8 +69,8 @@ pub fn noise_of(
     };
     let of_output =
         |(output, ways): (usize, Vec<ForcePath>)| ways.into_iter().enumerate().map(|path| kept(output, path)).collect();
-    let paths = paths.into_iter().enumerate().map(of_output).collect();
-    (noise, paths)
+    let each = paths.into_iter().enumerate().map(of_output).collect();
+    (noise, ForcePaths { each, common })
 }
 
 /// The equations at instants of a simulation, and the states at which a force may enter.
@@ -90,17 +92,29 @@ impl Ways {
         (!points.is_empty()).then_some(Self { entries, points })
     }
 
+    /// What the states and the outputs are made of, as they are for most of the time: by rows.
+    fn middle(&self, model: &Model<'_>) -> (Vec<f64>, Vec<f64>) {
+        let n = model.simulation().states.len();
+        let c = (0..n * model.simulation().outputs.len()).map(|i| middle(self.points.iter().map(|p| p.c[i])));
+        (middle_flow(&self.points, n), c.collect())
+    }
+
     /// The mean way from each entry to each output.
     fn paths(&self, model: &Model<'_>) -> Vec<Vec<ForcePath>> {
-        let simulation = model.simulation();
-        let n = simulation.states.len();
-        let a = middle_flow(&self.points, n);
-        let c: Vec<f64> =
-            (0..n * simulation.outputs.len()).map(|i| middle(self.points.iter().map(|p| p.c[i]))).collect();
+        let (a, c) = self.middle(model);
         let period_s = model.data().row_period_s();
-        c.chunks_exact(n)
+        c.chunks_exact(model.simulation().states.len())
             .map(|c| self.entries.iter().filter_map(|&entry| ForcePath::held(&a, entry, c, period_s)).collect())
             .collect()
+    }
+
+    /// The mean way from an entry to all outputs that it reaches; `None` where these are fewer than two.
+    fn common(&self, model: &Model<'_>, entry: usize) -> Option<CommonPath> {
+        let (a, c) = self.middle(model);
+        let data = model.data();
+        CommonPath::held((&a, &c), entry, data.row_period_s(), |outputs| {
+            data.layout.together(outputs.iter().copied()).iter().map(|run| run[0].rows.len()).collect()
+        })
     }
 }
 

@@ -48,7 +48,7 @@ fn estimated(fixed: &Simulation, data: &DataSet, share: f64, substeps: usize) ->
     if model.unknowns().is_empty() || head.y.is_empty() {
         return Some((Values::default(), true));
     }
-    let noise: Whitener = head.layout.fit_noise(&head.about_means(), 0, &[]);
+    let noise: Whitener = head.layout.white_noise(&head.about_means());
     let options = LmOptions { iterations: 25, ..LmOptions::default() };
     let start = model.theta(&Values::default());
     let Some(fit) = levenberg_marquardt(&model, &start, &head.layout, &noise, None, options) else {

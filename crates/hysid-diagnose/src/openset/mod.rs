@@ -150,7 +150,7 @@ pub fn correction(base: &Base<'_>, kind: NoiseKind) -> Option<OpenSet> {
 pub fn noises(base: &Base<'_>, kind: NoiseKind) -> Vec<Whitener> {
     let mut noises = vec![base.whitener.clone()];
     if kind == NoiseKind::Coloured && base.coloured() {
-        noises.push(base.model.data().layout.fit_noise(&base.fit.residual, 0, &[]));
+        noises.push(base.model.data().layout.white_noise(&base.fit.residual));
     }
     noises
 }

@@ -5,8 +5,8 @@ use super::firmness::is_a_spectrum;
 use super::resonance::is_of_the_simulation;
 use super::{FIRM, Support};
 use crate::budget::Step;
-use crate::evidence::SurrogateTest;
 use crate::evidence::better_by_chance;
+use crate::evidence::{ForcePaths, SurrogateTest};
 use crate::file::{CorrectionRecord, RemainingRecord, finite};
 use crate::model::base::{Base, MAX_AR};
 use crate::model::hypothesis::{Hypothesis, block_score};
@@ -263,7 +263,8 @@ pub fn left_by(search: &Search<'_, '_>, none: &Hypothesis<'_>, written: &Hypothe
 /// however smooth it is.
 fn noise_floor(best: &Hypothesis<'_>) -> Vec<f64> {
     let Base { model, fit, whitener, .. } = &best.base;
-    let coloured = whitener.is_white().then(|| model.data().layout.fit_noise(&fit.residual, MAX_AR, &[]));
+    let coloured =
+        whitener.is_white().then(|| model.data().layout.fit_noise(&fit.residual, MAX_AR, &ForcePaths::default()));
     let models = &coloured.as_ref().unwrap_or(whitener).models;
     models.iter().map(|m| m.innovation().min(m.noise_rms())).collect()
 }

@@ -13,7 +13,7 @@ const POLES: [f64; 4] = [0.5, 0.75, 0.88, 0.94];
 /// Decades between the first guesses of the share of the force, and where the search ends.
 const DECADES: (f64, f64) = (1.0, 0.25);
 /// The same between guesses of the memory of the sensor's noise.
-const MEMORY: f64 = 0.3;
+pub(in crate::evidence) const MEMORY: f64 = 0.3;
 /// Log likelihood by which a force may trail another model before its colour, or its course, is not asked for.
 const HOPELESS: f64 = 150.0;
 /// Log likelihood that the way from row to row gains at the share by the mean one or a tenth of it, before it is looked into.
@@ -26,7 +26,7 @@ const HINTS: [f64; 2] = [0.03, 0.5];
 const SCALE_ROWS: usize = 4000;
 
 /// A point of the search: where it is, the log likelihood there, and what comes with it.
-type Point<T> = (f64, f64, T);
+pub(in crate::evidence) type Point<T> = (f64, f64, T);
 
 /// The best share of a force of some colours: its decade, log likelihood and the standard deviation of the sensor's innovations.
 #[derive(Clone, Copy)]
@@ -131,7 +131,9 @@ impl<'a> Way<'a> {
         Some(move |decade: f64| {
             let variance = 10f64.powf(decade) / unit;
             let (squares, log) = match &moved {
-                Some(moved) => moved.innovations(variance, &stretches)?,
+                Some(moved) => {
+                    moved.innovations(variance, &stretches).map(|(squares, log)| (squares.iter().sum(), log))?
+                }
                 None => Filter::new(self.path, colours, variance, self.rows)?.innovations(&stretches),
             };
             self.profiled(squares, log, colours)
@@ -216,7 +218,7 @@ impl<'a> Way<'a> {
         };
         let rows = self.stretches.iter().map(|s| s.len()).sum::<usize>() as f64;
         let rms = (self.stretches.iter().map(|s| norm2(s)).sum::<f64>() / rows).sqrt();
-        Some(Driven { filter, moving, entry: self.path.entry(), colours, sigma, rms })
+        Some(Driven { filter, moving, entry: self.path.entry(), colours, share: variance, sigma, rms })
     }
 }
 
@@ -227,7 +229,10 @@ fn unit(path: &ForcePath, pole: f64, rows: usize) -> Option<f64> {
 }
 
 /// The decade at which a log likelihood is highest, from a first one on by steps that shrink; `at` gives it with what comes with it.
-fn search<T>((start, step): (f64, f64), at: impl Fn(f64) -> Option<(f64, T)>) -> Option<Point<T>> {
+pub(in crate::evidence) fn search<T>(
+    (start, step): (f64, f64),
+    at: impl Fn(f64) -> Option<(f64, T)>,
+) -> Option<Point<T>> {
     let at = |t: f64| at(t).map(|(likelihood, with)| (t, likelihood, with));
     let mut best = at(start)?;
     let mut step = step;

@@ -5,7 +5,7 @@
 //!
 //! Reference: P. J. Brockwell and R. A. Davis, Time Series, section 12.2 (the likelihood by the innovations of the filter).
 
-mod fit;
+pub(super) mod fit;
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -19,10 +19,12 @@ pub struct Driven {
     /// That of the rows it was fitted to, where the machine answers a force differently along its motion. Elsewhere the mean way holds.
     moving: Option<Arc<MovingFilter>>,
     /// The state in whose derivative the force enters.
-    entry: usize,
-    colours: Colours,
+    pub(super) entry: usize,
+    pub(super) colours: Colours,
+    /// Variance of the force, over that of the innovations of the sensor's noise.
+    pub(super) share: f64,
     /// Standard deviation of the innovations of the sensor's noise.
-    sigma: f64,
+    pub(super) sigma: f64,
     /// Standard deviation of what it was fitted to.
     rms: f64,
 }
@@ -90,14 +92,7 @@ impl Driven {
         if let Some(moving) = self.moving(run, v.len()) {
             v.iter_mut().for_each(|x| *x /= self.sigma);
             moving.transpose(run, v);
-            let pole = self.colours.sensor;
-            if pole != 0.0 {
-                let first = first_scale(pole);
-                for k in 0..v.len() {
-                    let next = v.get(k + 1).copied().unwrap_or(0.0);
-                    v[k] = if k == 0 { first * v[0] } else { v[k] } - pole * next;
-                }
-            }
+            transpose_differenced(v, self.colours.sensor);
         }
     }
 
@@ -108,14 +103,7 @@ impl Driven {
             w[k] = predicted + innovation;
             innovation
         });
-        let pole = self.colours.sensor;
-        if pole != 0.0 {
-            let mut last = None;
-            for w in w {
-                *w = last.map_or_else(|| *w / first_scale(pole), |last: f64| *w + pole * last);
-                last = Some(*w);
-            }
-        }
+        remembered(w, self.colours.sensor);
     }
 
     /// Logarithm of the determinant of the map from the white samples of a run of `n` rows.
@@ -131,17 +119,39 @@ impl Driven {
 }
 
 /// What the first sample of a first-order autoregression is scaled by, to be as large as its innovations.
-fn first_scale(pole: f64) -> f64 {
+pub(super) fn first_scale(pole: f64) -> f64 {
     (1.0 - pole * pole).sqrt()
 }
 
 /// A run less what a first-order autoregression of this pole tells from the sample before.
-fn differenced(e: &[f64], pole: f64) -> Cow<'_, [f64]> {
+pub(super) fn differenced(e: &[f64], pole: f64) -> Cow<'_, [f64]> {
     if pole == 0.0 {
         return Cow::Borrowed(e);
     }
     let first = e.iter().take(1).map(|e| first_scale(pole) * e);
     Cow::Owned(first.chain(e.windows(2).map(|pair| pair[1] - pole * pair[0])).collect())
+}
+
+/// The transpose of [`differenced`], in place.
+pub(super) fn transpose_differenced(v: &mut [f64], pole: f64) {
+    if pole != 0.0 {
+        let first = first_scale(pole);
+        for k in 0..v.len() {
+            let next = v.get(k + 1).copied().unwrap_or(0.0);
+            v[k] = if k == 0 { first * v[0] } else { v[k] } - pole * next;
+        }
+    }
+}
+
+/// The inverse of [`differenced`], in place.
+pub(super) fn remembered(w: &mut [f64], pole: f64) {
+    if pole != 0.0 {
+        let mut last = None;
+        for w in w {
+            *w = last.map_or_else(|| *w / first_scale(pole), |last: f64| *w + pole * last);
+            last = Some(*w);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -181,7 +191,7 @@ mod tests {
             let moving = path
                 .course()
                 .map(|course| Arc::new(Moved::new(&course, colours, &[&e]).unwrap().filter(variance).unwrap()));
-            let noise = Driven { filter, moving, entry: path.entry(), colours, sigma, rms: 1.0 };
+            let noise = Driven { filter, moving, entry: path.entry(), colours, share: variance, sigma, rms: 1.0 };
             let factor = covariance(&answers(path, n), variance, colours).cholesky().unwrap().l() * sigma;
             let near = |a: &[f64], b: &DVector<f64>| a.iter().zip(b.iter()).all(|(a, b)| (a - b).abs() < 1e-6);
             let column = DVector::from_column_slice(&e);

@@ -14,7 +14,7 @@ const LANE: usize = 8;
 type Lane = [f64; LANE];
 
 /// Change of a gain below which the filter has settled.
-const SETTLED: f64 = 1e-8;
+pub(super) const SETTLED: f64 = 1e-8;
 
 /// y += factor x.
 fn add(factor: f64, x: &[Lane], y: &mut [Lane]) {

@@ -6,7 +6,10 @@
 //!
 //! Reference: P. J. Brockwell and R. A. Davis, Time Series, section 12.2; P. Whittle (1953) for the spectrum.
 
+mod common;
+mod course;
 mod filter;
+mod gains;
 mod moving;
 #[cfg(test)]
 pub(super) mod samples;
@@ -15,8 +18,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+pub use common::CommonPath;
+pub(super) use common::Sensor;
+pub use course::Course;
 pub(super) use filter::Filter;
-pub use moving::Course;
 pub(super) use moving::{Moved, MovingFilter};
 
 /// First-order autoregressions of a force and of the sensor's noise: their poles, 0 where one is white.
@@ -74,6 +79,15 @@ pub struct ForcePath {
     c: DVector<f64>,
     /// The same from row to row, where the machine answers a force differently along its motion.
     course: Option<Arc<Course>>,
+}
+
+/// The ways of an unknown force to the outputs of a simulation.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ForcePaths {
+    /// To each output by itself.
+    pub each: Vec<Vec<ForcePath>>,
+    /// To several of them at once.
+    pub common: Vec<CommonPath>,
 }
 
 /// Inner product of a few numbers.

@@ -11,118 +11,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
 
+use super::course::Course;
 use super::{Colours, dot_short as dot};
 use crate::evidence::norm2;
-
-/// A way from a force to one output that changes from row to row, for each run of rows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Course {
-    pub(super) states: usize,
-    /// The state that is a force with a memory, which has its variance from the start.
-    remembered: Option<usize>,
-    /// Of each row of each run: the matrix to the next row (by rows), what a unit force adds to it, the output.
-    runs: Vec<Vec<f64>>,
-}
-
-impl Course {
-    /// Of the rows of each run, as they stand in [`Course`]; `None` where one is not finite.
-    pub fn new(states: usize, runs: Vec<Vec<f64>>) -> Option<Self> {
-        let finite = states > 0 && runs.iter().flatten().all(|x| x.is_finite());
-        finite.then_some(Self { states, remembered: None, runs })
-    }
-
-    /// Numbers that a row takes.
-    const fn width(states: usize) -> usize {
-        states * (states + 2)
-    }
-
-    /// Rows of a run.
-    fn rows(&self, run: usize) -> usize {
-        self.runs.get(run).map_or(0, |rows| rows.len() / Self::width(self.states))
-    }
-
-    /// Matrix, force and output of each row of a run.
-    pub(super) fn steps(
-        &self,
-        run: usize,
-    ) -> impl DoubleEndedIterator<Item = (&[f64], &[f64], &[f64])> + ExactSizeIterator {
-        let n = self.states;
-        self.runs[run].chunks_exact(Self::width(n)).map(move |row| {
-            let (a, rest) = row.split_at(n * n);
-            let (b, c) = rest.split_at(n);
-            (a, b, c)
-        })
-    }
-
-    /// The same for noises of these colours.
-    fn coloured(self: &Arc<Self>, colours: Colours) -> Arc<Self> {
-        if colours == Colours::WHITE {
-            return Arc::clone(self);
-        }
-        let n = self.states;
-        let states = n + colours.states();
-        let longer = |run: usize| {
-            let mut rows = Vec::with_capacity(self.rows(run) * Self::width(states));
-            self.steps(run).for_each(|row| colours.extend(row, &mut rows));
-            rows
-        };
-        let remembered = (colours.force != 0.0).then_some(n);
-        Arc::new(Self { states, remembered, runs: (0..self.runs.len()).map(longer).collect() })
-    }
-
-    /// The rows of a run by arrays.
-    fn rows_of<const N: usize>(&self, run: usize) -> impl Iterator<Item = Row<N>> {
-        self.steps(run).map(|(a, b, c)| Row {
-            a: std::array::from_fn(|i| std::array::from_fn(|j| a[i * N + j])),
-            b: std::array::from_fn(|i| b[i]),
-            c: std::array::from_fn(|i| c[i]),
-        })
-    }
-
-    /// The filter before the first row of a run.
-    fn begun<const N: usize>(&self, variance: f64) -> Riccati<N> {
-        let mut p = [[0.0; N]; N];
-        if let Some(force) = self.remembered {
-            p[force][force] = variance;
-        }
-        Riccati { p, variance }
-    }
-}
-
-/// A row by arrays: matrix, force, output.
-struct Row<const N: usize> {
-    a: [[f64; N]; N],
-    b: [f64; N],
-    c: [f64; N],
-}
-
-/// The covariance of the predicted state, for noise of the sensor with unit variance.
-struct Riccati<const N: usize> {
-    p: [[f64; N]; N],
-    variance: f64,
-}
-
-impl<const N: usize> Riccati<N> {
-    /// Power and gain of a row's innovation, and the covariance of the next row; `None` where that is not finite.
-    fn next(&mut self, row: &Row<N>) -> Option<(f64, [f64; N])> {
-        let Row { a, b, c } = row;
-        let pc: [f64; N] = std::array::from_fn(|i| dot(&self.p[i], c));
-        let power = 1.0 + dot(c, &pc);
-        if !(power > 0.0 && power.is_finite()) {
-            return None;
-        }
-        let gain: [f64; N] = std::array::from_fn(|i| dot(&a[i], &pc) / power);
-        // It is symmetric.
-        let ap: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| dot(&a[i], &self.p[j])));
-        for i in 0..N {
-            for j in 0..=i {
-                let next = dot(&ap[i], &a[j]) + self.variance * b[i] * b[j] - power * gain[i] * gain[j];
-                (self.p[i][j], self.p[j][i]) = (next, next);
-            }
-        }
-        Some((power, gain))
-    }
-}
 
 /// Calls a function of a course for the number of its states; `None` where these are more than are taken.
 macro_rules! of_size {
@@ -146,21 +37,24 @@ macro_rules! of_size {
 /// Product of powers beyond which its logarithm is taken.
 const LARGE: f64 = 1e100;
 
-/// Sum of squares of the scaled innovations of stretches, and of the logarithms of their standard deviations.
-fn innovations_of<const N: usize>(course: &Course, variance: f64, stretches: &[Vec<f64>]) -> Option<(f64, f64)> {
-    let (mut squares, mut logs, mut powers) = (0.0, 0.0, 1.0_f64);
+/// Sums of squares of the scaled innovations of stretches, for each row of a moment, and the sum of the logarithms of their standard deviations.
+type Innovations = (Vec<f64>, f64);
+
+/// Those of a course.
+fn innovations_of<const N: usize>(course: &Course, variance: f64, stretches: &[Vec<f64>]) -> Option<Innovations> {
+    let (mut squares, mut logs, mut powers) = (vec![0.0; course.together], 0.0, 1.0_f64);
     for (run, e) in stretches.iter().enumerate() {
-        let (mut x, mut riccati) = ([0.0; N], course.begun::<N>(variance));
-        for (row, e) in course.rows_of::<N>(run).zip(e) {
-            let (power, gain) = riccati.next(&row)?;
+        let (mut x, mut gains) = ([0.0; N], course.begun::<N>(run, variance));
+        for (k, (row, e)) in course.rows_of::<N>(run).zip(e).enumerate() {
+            let (power, gain) = gains.next(&row)?;
             let innovation = e - dot(&row.c, &x);
-            squares += innovation * innovation / power;
+            squares[k % course.together] += innovation * innovation / power;
             powers *= power;
             if powers > LARGE {
                 logs += powers.ln();
                 powers = 1.0;
             }
-            x = std::array::from_fn(|i| dot(&row.a[i], &x) + gain[i] * innovation);
+            x = std::array::from_fn(|i| if row.moves { dot(&row.a[i], &x) } else { x[i] } + gain[i] * innovation);
         }
     }
     Some((squares, 0.5 * (logs + powers.ln())))
@@ -174,9 +68,9 @@ fn gains_of<const N: usize>(course: &Course, variance: f64) -> Option<Gains> {
     let runs = 0..course.runs.len();
     let (mut sigmas, mut gains) = (vec![Vec::new(); runs.len()], vec![Vec::new(); runs.len()]);
     for run in runs {
-        let mut riccati = course.begun::<N>(variance);
+        let mut known = course.begun::<N>(run, variance);
         for row in course.rows_of::<N>(run) {
-            let (power, gain) = riccati.next(&row)?;
+            let (power, gain) = known.next(&row)?;
             sigmas[run].push(power.sqrt());
             gains[run].extend(gain);
         }
@@ -194,7 +88,7 @@ pub(in crate::evidence) struct MovingFilter {
 }
 
 /// A course with noises of some colours.
-pub(in crate::evidence) struct Moved(Arc<Course>);
+pub(in crate::evidence) struct Moved(pub(super) Arc<Course>);
 
 impl Moved {
     /// `None` where the course has other runs than these stretches.
@@ -203,8 +97,8 @@ impl Moved {
         (rows && course.runs.len() == stretches.len()).then(|| Self(course.coloured(colours)))
     }
 
-    /// Sum of squares of the scaled innovations of stretches, and of the logarithms of their standard deviations, under a force of this variance.
-    pub(in crate::evidence) fn innovations(&self, variance: f64, stretches: &[Vec<f64>]) -> Option<(f64, f64)> {
+    /// [`Innovations`] of stretches under a force of this variance.
+    pub(in crate::evidence) fn innovations(&self, variance: f64, stretches: &[Vec<f64>]) -> Option<Innovations> {
         of_size!(self.0.states, innovations_of(&self.0, variance, stretches))
     }
 
@@ -277,7 +171,12 @@ impl MovingFilter {
 
     /// Sum of the logarithms of the standard deviations of a run's innovations.
     pub(in crate::evidence) fn log_scale(&self, run: usize) -> f64 {
-        self.sigmas[run].iter().map(|s| s.ln()).sum()
+        self.log_scale_of(run, 0, 1)
+    }
+
+    /// The same of those rows alone that stand at a place among so many of a moment.
+    pub(in crate::evidence) fn log_scale_of(&self, run: usize, place: usize, together: usize) -> f64 {
+        self.sigmas[run].iter().skip(place).step_by(together).map(|s| s.ln()).sum()
     }
 
     /// Root mean square of the standard deviations of the innovations.

@@ -223,8 +223,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::evidence::Whitener;
     use crate::evidence::layout::Series;
+    use crate::evidence::{ForcePaths, Whitener};
     use crate::random::generator;
 
     const N: usize = 1000;
@@ -328,7 +328,7 @@ mod tests {
     fn tested(layout: &Layout, own: &[Vec<f64>], effects: &[Vec<f64>], e: &[f64], seed: u64) -> SurrogateTest {
         let mut r0 = e.to_vec();
         Projector::new(own.to_vec()).remove(&mut r0);
-        let whitener: Whitener = layout.fit_noise(&r0, 16, &[]);
+        let whitener: Whitener = layout.fit_noise(&r0, 16, &ForcePaths::default());
         let own = Projector::new(own.iter().map(|c| whitener.apply(layout, c)));
         let mut r = whitener.apply(layout, e);
         own.remove(&mut r);

@@ -192,7 +192,7 @@ fn judged(
     if matches!(course, Course::Walk(_)) && left.order() == 0 {
         // White noise of the size of the whole residual would leave little for the walk to explain.
         let (_, after) = regress(base, &picked, &left, None, 0.0);
-        left = layout.fit_noise(&after, 0, &[]);
+        left = layout.white_noise(&after);
     }
     for _ in 0..ROUNDS {
         if let Course::Walk(scale) = &mut course {

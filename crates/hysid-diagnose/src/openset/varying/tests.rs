@@ -46,7 +46,7 @@ fn fitted(data: &DataSet) -> Base<'_> {
 
 fn found(data: &DataSet) -> LikelyVariation {
     let base = fitted(data);
-    let plain = data.layout.fit_noise(&base.fit.residual, 0, &[]);
+    let plain = data.layout.white_noise(&base.fit.residual);
     varying(&base, NoiseKind::Coloured, &[base.whitener.clone(), plain]).swap_remove(0)
 }
 
