@@ -261,12 +261,14 @@ fn swapped<'d>(
         parts[index] = Part::of_candidate(rival, 0, amplitudes);
         let begun = |parts: &[Part]| assemble(setting, none, &values, parts, &set.base.whitener, 5);
         let own = begun(&parts);
-        // A relative begins where the member stands, too.
+        // A relative begins where the member stands, too, and so does a law that contains the member's: it follows the recording no worse.
         let member = &set.effects[index];
-        let inheriting = rival.mechanism.family == member.mechanism.family && rival.slot.label == member.slot.label;
+        let wider = rival.mechanism.contains.contains(&member.mechanism.id);
+        let related = wider || rival.mechanism.family == member.mechanism.family;
+        let inheriting = related && rival.slot.label == member.slot.label;
         let heir = inheriting.then(|| {
             let law = rival.mechanism.law_at(&rival.slot, rival.refit.purpose);
-            parts[index].values = inherited(&law, &parts[index].values, member, &values);
+            parts[index].values = inherited((rival.mechanism, &law), &parts[index].values, member, &values);
             begun(&parts)
         });
         let h = own.into_iter().chain(heir.flatten()).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;

@@ -11,7 +11,7 @@ use super::finish::finish;
 use super::given_up::HOPELESS;
 use super::screen::rewrite_at;
 use crate::budget::Step;
-use crate::mechanism::{Form, Law, Purpose, Role};
+use crate::mechanism::{Form, Law, Mechanism, Purpose, Role};
 use crate::model::Values;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
@@ -134,15 +134,25 @@ fn written_as<'d>(
 }
 
 /// Start values for a law in the place of an effect, in the order of the law: what both name alike as the effect has it, further amplitudes at zero,
-/// further shapes as in `own`, values in the same order. A friction that turns out to be unequal begins at the size that it has as an equal one.
-pub fn inherited(law: &Law, own: &[Option<f64>], effect: &Effect, values: &Values) -> Vec<Option<f64>> {
+/// further shapes as in `own`, values in the same order; where the mechanism contains that of the effect they are alike in order (the time constant of a lag
+/// is that of a winding). A friction that turns out to be unequal begins at the size that it has as an equal one.
+pub fn inherited(
+    (mechanism, law): (&Mechanism, &Law),
+    own: &[Option<f64>],
+    effect: &Effect,
+    values: &Values,
+) -> Vec<Option<f64>> {
     let present = effect.mechanism.law_at(&effect.slot, effect.written.purpose);
     let (amplitudes, shapes) = named(&present, effect, values);
     let names = Names::of(law);
     let alike = |list: &[Named], name: &String| list.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
     let further = own.iter().skip(names.amplitudes.len());
     let first = names.amplitudes.iter().map(|name| Some(alike(&amplitudes, name).unwrap_or(0.0)));
-    first.chain(names.shapes.iter().zip(further).map(|(name, own)| alike(&shapes, name).or(*own))).collect()
+    let in_order = |at: usize| {
+        shapes.get(at).filter(|_| mechanism.contains.contains(&effect.mechanism.id)).map(|(_, value)| *value)
+    };
+    let others = names.shapes.iter().zip(further).enumerate();
+    first.chain(others.map(|(at, (name, own))| alike(&shapes, name).or(in_order(at)).or(*own))).collect()
 }
 
 /// The names that a law has for what is fitted.
@@ -194,6 +204,9 @@ fn spread(old: &[Named], new: &[String]) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mechanism::conformance::{example_signals, specimens};
+    use crate::mechanism::mechanism;
+    use crate::slot::Structure;
 
     #[test]
     fn of_forms_that_tie_the_one_that_leaves_the_least_is_taken() {
@@ -214,10 +227,6 @@ mod tests {
 
     #[test]
     fn a_law_in_the_place_of_another_begins_where_that_stands() {
-        use crate::mechanism::conformance::{example_signals, specimens};
-        use crate::mechanism::{Purpose, mechanism};
-        use crate::slot::Structure;
-
         let simulation = specimens().swap_remove(0);
         let coulomb = mechanism("coulomb_friction").unwrap();
         let slot = coulomb.slots(&Structure::of(&simulation)).remove(0);
@@ -227,10 +236,34 @@ mod tests {
         values.parameters.insert(written.amplitudes[0].name.clone(), 3.5);
         let effect = Effect { mechanism: coulomb, slot: slot.clone(), written, concealment: None };
         let begun = |id: &str, own: &[Option<f64>]| {
-            inherited(&mechanism(id).unwrap().law_at(&slot, Purpose::Refit), own, &effect, &values)
+            let mechanism = mechanism(id).unwrap();
+            inherited((mechanism, &mechanism.law_at(&slot, Purpose::Refit)), own, &effect, &values)
         };
         assert_eq!(begun("asymmetric_friction", &[Some(9.0), Some(8.0)]), [Some(3.5), Some(0.0)]);
         assert_eq!(begun("stribeck_friction", &[Some(9.0), Some(8.0), Some(0.2)]), [Some(3.5), Some(0.0), Some(0.2)]);
+    }
+
+    #[test]
+    fn a_winding_begins_with_the_time_constant_of_the_lag_that_it_contains() {
+        let [lag, winding] = ["actuator_lag", "back_emf"].map(|id| mechanism(id).unwrap());
+        let places = specimens().into_iter().find_map(|simulation| {
+            let structure = Structure::of(&simulation);
+            let at = lag.slots(&structure).into_iter().next()?;
+            let there = winding.slots(&structure).into_iter().find(|s| s.label == at.label)?;
+            Some((simulation, at, there))
+        });
+        let (simulation, slot, there) = places.unwrap();
+        let signals = example_signals(&simulation, &slot);
+        let written = lag.rewrite(&simulation, &slot, &signals, Purpose::Refit).unwrap();
+        let mut values = Values::default();
+        values.parameters.insert(written.shapes[0].name.clone(), 0.02);
+        let effect = Effect { mechanism: lag, slot, written, concealment: None };
+        let law = winding.law_at(&there, Purpose::Refit);
+        let own = [Some(9.0), Some(8.0)];
+        assert_eq!(inherited((winding, &law), &own, &effect, &values), [Some(0.0), Some(0.02)]);
+        // A delay is contained in none.
+        let other = mechanism("sensor_lag").unwrap();
+        assert_eq!(inherited((other, &law), &own, &effect, &values), [Some(0.0), Some(8.0)]);
     }
 
     #[test]

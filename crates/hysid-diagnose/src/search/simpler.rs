@@ -67,7 +67,7 @@ fn simpler<'d>(
     parts[member] = Part {
         mechanism: special,
         purpose: Purpose::Refit,
-        values: inherited(&law, &vec![None; law.parameters.len()], effect, &values),
+        values: inherited((special, &law), &vec![None; law.parameters.len()], effect, &values),
         ..Part::of_effect(effect, &values)
     };
     let h = assemble(setting, none, &values, &parts, &set.base.whitener, SKETCH)?;
