@@ -34,6 +34,11 @@ const PEAKS: usize = 12;
 /// Share of a peak's size that the place next to it has at least.
 const NEAR_THE_PEAK: f64 = 0.9;
 
+/// Rounds in which multiples and step are fitted in turn, and the rms distance of values from multiples, in steps, up to which it is known which they stand at
+/// (0.29 where they stand anywhere).
+const ROUNDS: usize = 4;
+const CLUSTERED: f64 = 0.15;
+
 /// The step of these values, of which a simulation without steps says what they would be; `None` where they show none.
 pub fn resolution(values: &[f64], simulated: &[f64]) -> Option<f64> {
     let every = values.len().div_ceil(MOST_VALUES).max(1);
@@ -43,10 +48,36 @@ pub fn resolution(values: &[f64], simulated: &[f64]) -> Option<f64> {
     sorted.sort_by(f64::total_cmp);
     // A converter behind the noise has steps of its own, which are finer.
     let fine = repeated(&sorted);
-    match (fine, sawtooth(values, simulated, fine).or_else(|| blurred(&sorted))) {
+    let step = match (fine, sawtooth(values, simulated, fine).or_else(|| blurred(&sorted))) {
         (Some(fine), Some(coarse)) if coarse < 3.0 * fine => Some(fine),
         (fine, coarse) => coarse.or(fine),
+    };
+    step.map(|step| fitted(values, step))
+}
+
+/// The step of which values that cluster at multiples of one are nearest to multiples, by least squares; the step as it is where noise hides which multiple each
+/// value stands at. Where a signal covers many steps, a thousandth of one rounds some of them to the next.
+fn fitted(values: &[f64], step: f64) -> f64 {
+    let mut best = step;
+    for _ in 0..ROUNDS {
+        let (mut left, mut product, mut squares, mut count, mut most) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
+        for v in values.iter().filter(|v| v.is_finite()) {
+            let multiple = (v / best).round();
+            left += (v - best * multiple).powi(2);
+            product += v * multiple;
+            squares += multiple * multiple;
+            count += 1.0;
+            most = most.max(multiple.abs());
+        }
+        let next = product / squares;
+        let clustered = left < count * (CLUSTERED * best).powi(2);
+        // Not to where the outermost values would be counted anew.
+        if !clustered || !((next - step).abs() * most < 0.25 * step) {
+            break;
+        }
+        best = next;
     }
+    best
 }
 
 /// The smallest step between sorted values that repeat themselves.
@@ -194,11 +225,15 @@ mod tests {
         (x.iter().map(|v| q * (v / q).round() + noise(&mut rng)).collect(), x)
     }
 
-    fn found(q: f64, found: Option<f64>, what: &str) {
+    /// Whether the step is the true one, to a tenth of a step over the range of the signal; or to where it is where values cluster.
+    fn found(q: f64, sigma: f64, found: Option<f64>, what: &str) {
         let found = found.unwrap_or_else(|| panic!("{q} {what}: none"));
-        // In steps, over the range of the signal.
         let off = (found / q - 1.0).abs() * RANGE / q;
-        assert!(off < 0.1, "{q} {what}: {found}, {off} steps off");
+        // Four standard deviations of the slope of a line through the origin.
+        let squares: f64 = smooth(2000).iter().map(|v| (v / q).round().powi(2)).sum();
+        let clustered = 4.0 * sigma / squares.sqrt() / q * RANGE / q + 1e-9;
+        let most = if sigma < 0.14 * q { clustered } else { 0.1 };
+        assert!(off < most, "{q} {what}: {found}, {off} steps off");
     }
 
     #[test]
@@ -206,9 +241,9 @@ mod tests {
         // A rounding error has an rms of 0.29 of the step: the last is noise as large.
         for (q, sigma) in [(0.2, 0.0), (0.2, 0.02), (0.2, 0.04), (0.03, 0.003), (0.9, 0.09), (0.1, 0.029)] {
             let (values, simulated) = rounded(q, sigma);
-            found(q, resolution(&values, &simulated), "beside a simulation");
+            found(q, sigma, resolution(&values, &simulated), "beside a simulation");
             if sigma < 0.25 * q {
-                found(q, resolution(&values, &[]), "by values alone");
+                found(q, sigma, resolution(&values, &[]), "by values alone");
             }
         }
     }
@@ -217,7 +252,7 @@ mod tests {
     fn beside_a_simulation_steps_below_the_noise_are_found() {
         let (values, simulated) = rounded(0.1, 0.1);
         assert_eq!(resolution(&values, &[]), None);
-        found(0.1, resolution(&values, &simulated), "below the noise");
+        found(0.1, 0.1, resolution(&values, &simulated), "below the noise");
     }
 
     #[test]
