@@ -9,8 +9,8 @@ use crate::text::number;
 
 /// Share of a set's log evidence that a member must bring.
 const TRIFLE: f64 = 0.03;
-/// Share of the squared error that a set takes from which on a member that takes it is none.
-const MUCH: f64 = 0.3;
+/// Share of the squared error that a set takes, and log evidence, from which on a member that takes and brings so much is none.
+const MUCH: (f64, f64) = (0.3, 20.0);
 
 /// A member that is not told.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,11 +32,12 @@ impl Trifle {
     }
 }
 
-/// Whether what a set has besides `rest` takes a good part of the squared error that the set takes of the `simulation`: what the form of a law leaves is small
-/// beside what the law takes. Evidence does not say so where the noise model predicts an error that is slow (gravity on a drive, beside a backlash).
+/// Whether what a set has besides `rest` is plain to see and takes a good part of the squared error that the set takes of the `simulation`: what the form of a law
+/// leaves is small beside what the law takes. The share of evidence does not say so where the noise model predicts an error that is slow (gravity on a drive,
+/// beside a backlash).
 fn takes_much(simulation: &Hypothesis<'_>, rest: &Hypothesis<'_>, set: &Hypothesis<'_>) -> bool {
     let [none, without, with] = [simulation, rest, set].map(|h| h.base.unexplained());
-    without - with > MUCH * (none - with)
+    set.log_evidence > rest.log_evidence + MUCH.1 && without - with > MUCH.0 * (none - with)
 }
 
 /// Whether a set is another one with no more than trifles added: what is told in its place says what it says. Gains count from the first of the pool.
@@ -116,6 +117,7 @@ mod tests {
         let mut pool = [none, spring, offset, both];
         if slow {
             pool[1].base.fit.residual = pool[0].base.fit.residual.clone();
+            pool[3].log_evidence = pool[1].log_evidence + 1.2 * MUCH.1;
         }
         let (place, trifles) = without_trifles(&pool, 3, 0, &pool[0]);
         // Nor does a set say the same that has less in it, or something else.
