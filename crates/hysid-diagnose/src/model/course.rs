@@ -147,8 +147,10 @@ mod tests {
     use super::super::force::noise_of;
     use super::super::hypothesis::recorded;
     use super::*;
+    use crate::evidence::Whitener;
     use crate::oscillator::{normal, rms};
     use crate::refit::Problem;
+    use hysid_linalg::dot;
 
     #[test]
     fn a_step_is_the_exponential_and_its_integral() {
@@ -207,5 +209,57 @@ mod tests {
         assert!(driven && (above / below - 1.0).abs() < 0.1, "{above} {below}");
         let (driven, [above, below]) = choke("1.25");
         assert!(driven && (above / below - 1.0).abs() < 0.1, "{above} {below}");
+    }
+
+    /// Two tanks in a row under a random inflow beside the recorded one, each level shown with noise of its own: the state at which a force in common enters, and the
+    /// largest correlation of the two whitened levels at lags up to 20, in its standard deviations, by the joint filter and by one for each.
+    fn tanks(outflow: &str) -> (Option<usize>, [f64; 2]) {
+        let flow = |tank: &str| outflow.replace("h", tank);
+        let text = format!(
+            "[time]\nperiod_s = 1.0\n[inputs]\nq = \"inflow_L_s\"\n[parameters]\ns = {{ value = 0.5, min = 0.1 }}\n[states]\n\
+             h1 = {{ derivative = \"(q - s*{})/8\", initial = 4.0 }}\nh2 = {{ derivative = \"(s*{} - s*{})/5\", initial = 4.0 }}\n[outputs]\na_m = \"h1\"\nb_m = \"h2\"\n",
+            flow("h1"),
+            flow("h1"),
+            flow("h2")
+        );
+        let simulation = Simulation::parse(&text, "tanks.sim.toml").unwrap();
+        let mut random = normal(3);
+        let n = 3000;
+        let q: Vec<f64> = (0..n).map(|k| 1.0 + 0.6 * (0.02 * f64::from(k)).sin()).collect();
+        let pushed: Vec<f64> = q.iter().map(|q| q + 0.2 * random()).collect();
+        let answer = |q: Vec<f64>| {
+            let data = recorded(&simulation, 1.0, [("inflow_L_s", q.clone()), ("a_m", q.clone()), ("b_m", q)]);
+            let model = Model::new(&simulation, &data, 2).unwrap();
+            model.predict(&model.theta(&Values::default())).unwrap()
+        };
+        let levels: Vec<f64> = answer(pushed).iter().map(|h| h + 0.02 * random()).collect();
+        let (a, b) = levels.split_at(q.len());
+        let data = recorded(&simulation, 1.0, [("inflow_L_s", q), ("a_m", a.to_vec()), ("b_m", b.to_vec())]);
+        let model = Model::new(&simulation, &data, 2).unwrap();
+        let theta = model.theta(&Values::default());
+        let residual = model.residual(&theta).unwrap();
+        let (noise, paths) = noise_of(&model, &theta, &residual, &["h1".to_owned(), "h2".to_owned()]);
+        assert_eq!(
+            paths.common.len(),
+            usize::from(noise.common_from().is_some()),
+            "it is kept for what is fitted beside it"
+        );
+        let largest = |noise: &Whitener| {
+            let white = noise.apply(&data.layout, &residual);
+            let (a, b) = white.split_at(a.len());
+            let at =
+                |lag: usize| dot(&a[lag..], &b[..b.len() - lag]).abs().max(dot(&b[lag..], &a[..a.len() - lag]).abs());
+            (0..=20).map(at).fold(0.0, f64::max) / (a.len() as f64).sqrt()
+        };
+        let each = Whitener::of(noise.models.clone());
+        (noise.common_from(), [largest(&noise), largest(&each)])
+    }
+
+    #[test]
+    fn what_two_tanks_have_in_common_is_one_flow() {
+        for outflow in ["sqrt(max(h,0))", "0.5*h"] {
+            let (from, [joint, apart]) = tanks(outflow);
+            assert!(from == Some(0) && joint < 4.2 && apart > 4.2, "{outflow}: {from:?} {joint} {apart}");
+        }
     }
 }

@@ -149,7 +149,10 @@ impl CommonForce {
         price: f64,
     ) -> Option<Self> {
         let outputs = path.outputs();
-        let runs = whole(path, layout)?;
+        let runs = complete(layout, outputs)?;
+        if runs.is_empty() || !path.moments().eq(runs.iter().map(|run| run[0].rows.len())) {
+            return None;
+        }
         let runs = runs.iter().map(|run| run.iter().map(|s| &residual[s.rows.clone()]).collect()).collect();
         let problem = Problem { path, runs };
         let own = |o: usize| models[o].driven().filter(|driven| driven.entry == path.entry());
@@ -202,10 +205,8 @@ impl CommonForce {
 
     /// The runs of a layout that it was fitted to; `None` where it has others.
     pub fn runs<'a>(&self, layout: &'a Layout) -> Option<Vec<Vec<&'a Series>>> {
-        let runs = layout.together(self.outputs.iter().copied());
-        let all = layout.series.iter().filter(|s| self.has(s.output)).count() == runs.len() * self.outputs.len();
         let known = |(i, run): (usize, &Vec<&Series>)| self.filter.has(i, run[0].rows.len() * self.outputs.len());
-        (all && runs.iter().enumerate().all(known)).then_some(runs)
+        complete(layout, &self.outputs).filter(|runs| runs.iter().enumerate().all(known))
     }
 
     /// Whitens the outputs of these runs.
@@ -263,13 +264,11 @@ impl CommonForce {
     }
 }
 
-/// The runs that all outputs of a way recorded together; `None` where one of them has others too, or the way has other moments.
-fn whole<'a>(path: &CommonPath, layout: &'a Layout) -> Option<Vec<Vec<&'a Series>>> {
-    let outputs = path.outputs();
+/// The runs that these outputs recorded together; `None` where one of them has others too.
+fn complete<'a>(layout: &'a Layout, outputs: &[usize]) -> Option<Vec<Vec<&'a Series>>> {
     let runs = layout.together(outputs.iter().copied());
-    let all = layout.series.iter().filter(|s| outputs.contains(&s.output)).count() == runs.len() * outputs.len();
-    let alike = path.moments().eq(runs.iter().map(|run| run[0].rows.len()));
-    (all && alike && !runs.is_empty()).then_some(runs)
+    let all = layout.series.iter().filter(|s| outputs.contains(&s.output)).count();
+    (all == runs.len() * outputs.len()).then_some(runs)
 }
 
 /// The outputs of a run one after the other, each in units of its sensor's innovations and less what the sensor's noise before tells of it.

@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::layout::Whitener;
 use super::super::response::samples::{PERIOD, autoregressive, white};
-use super::super::response::{Colours, ForcePath, ForcePaths, samples};
+use super::super::response::{ForcePath, ForcePaths, samples};
 use super::*;
 
 /// Two masses in a row: the force acts on the first, the second follows.
@@ -74,18 +74,12 @@ fn the_joint_innovations_are_the_cholesky_factor_of_the_covariance() {
                 CommonForce { outputs: vec![0, 2], entry: ENTRY, pole, sensors: sensors.to_vec(), filter, below };
             let runs = common.runs(&layout).unwrap();
             // What each sensor makes, and what the force does, at rows of all moments.
-            let forced = samples::covariance(&DMatrix::zeros(n, n), 0.0, Colours { force: 0.0, sensor: 0.0 });
-            let memory =
-                DMatrix::from_fn(
-                    n,
-                    n,
-                    |i, j| if pole == 0.0 { forced[(i, j)] } else { pole.powi(i.abs_diff(j) as i32) },
-                );
+            let lag = |i: usize, j: usize| i.abs_diff(j) as i32;
+            let memory = DMatrix::from_fn(n, n, |i, j| pole.powi(lag(i, j)));
             let own = |i: usize, j: usize| {
                 let s = sensors[i % 2];
-                let lag = (i / 2).abs_diff(j / 2);
-                let together = i % 2 == j % 2 && (s.pole != 0.0 || lag == 0);
-                if together { s.sigma * s.sigma * s.pole.powi(lag as i32) / (1.0 - s.pole * s.pole) } else { 0.0 }
+                let alike = f64::from(u8::from(i % 2 == j % 2));
+                alike * s.sigma * s.sigma * s.pole.powi(lag(i / 2, j / 2)) / (1.0 - s.pole * s.pole)
             };
             let covariance = DMatrix::from_fn(2 * n, 2 * n, own) + &answers * memory * answers.transpose() * variance;
             let factor = covariance.cholesky().unwrap().l();
