@@ -128,9 +128,15 @@ pub fn compose<'d>(
             break;
         }
         let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-        // What moves the machine at random is in its free run, where further effects take some of it, one after the other.
+        // What moves the machine at random is in its free run, where further effects take some of it, one after the other. Two that are there take more of it together
+        // than a force can.
         if reached >= best + LEAST_GAIN && (ask.pushed)(&pool[standing], &found) {
-            break;
+            let room = depth < options.depth && !enough();
+            let together = if room { two_at_once(setting, &pool[standing], options, ask) } else { Vec::new() };
+            if together.is_empty() || (ask.pushed)(&pool[standing], &together) {
+                break;
+            }
+            found.extend(together);
         }
         for h in found {
             add(pool, h);
