@@ -50,6 +50,11 @@ impl Layout {
         self.len() == 0
     }
 
+    /// What a coefficient of a noise must gain before it is believed: half of the logarithm of the number of rows (Bayes' criterion).
+    pub fn price(&self) -> f64 {
+        0.5 * (self.len().max(2) as f64).ln()
+    }
+
     /// The series, each after its place among those of its output.
     pub fn runs(&self) -> impl Iterator<Item = (usize, &Series)> {
         let mut seen = vec![0; self.outputs];
@@ -87,7 +92,7 @@ impl Layout {
         max_order: usize,
         paths: &[Vec<ForcePath>],
         course: impl Fn(usize, usize) -> Option<Arc<Course>>,
-        common: impl Fn(usize) -> Option<CommonPath>,
+        common: impl Fn(usize) -> Option<Arc<CommonPath>>,
     ) -> Whitener {
         let models: Vec<NoiseModel> = (0..self.outputs)
             .map(|o| {
@@ -97,18 +102,14 @@ impl Layout {
             })
             .collect();
         let shared = |noise: &Whitener| Shared::of(self, &noise.apply(self, residual));
-        let price = 0.5 * (self.len().max(2) as f64).ln();
-        let score = |noise: &Whitener| {
-            let white = noise.apply(self, residual);
-            -0.5 * norm2(&white) - noise.log_scale(self) - price * noise.coefficients() as f64
-        };
+        let score = |noise: &Whitener| noise.log_likelihood(self, residual);
         let mut best = Whitener::of(models);
         if max_order > 0 {
             best.shared = shared(&best);
         }
         let entries: BTreeSet<usize> = best.models.iter().filter_map(|m| Some(m.driven()?.entry)).collect();
         for path in entries.into_iter().filter_map(common) {
-            let fitted = CommonForce::fit(&path, self, residual, &best.models, price);
+            let fitted = CommonForce::fit(&path, self, residual, &best.models, self.price());
             let with = |common: CommonForce| {
                 let alone = Whitener { common: Some((common.clone(), None)), ..best.clone() };
                 Whitener { common: Some((common, shared(&alone))), ..alone }
@@ -135,13 +136,18 @@ impl Layout {
     }
 }
 
-/// By what the series of a layout are whitened.
+/// What whitens a layout beside the models of its outputs.
 struct Parts<'a> {
-    /// Those that models of their own whiten, each after its place among those of its output.
-    alone: Vec<(usize, &'a Series)>,
     /// A force in common, with its runs.
     common: Option<(&'a CommonForce, Vec<Vec<&'a Series>>)>,
     shared: Option<&'a Shared>,
+}
+
+impl Parts<'_> {
+    /// The series that models of their own whiten, each after its place among those of its output.
+    fn alone<'l>(&self, layout: &'l Layout) -> impl Iterator<Item = (usize, &'l Series)> {
+        layout.runs().filter(|(_, s)| self.common.as_ref().is_none_or(|(common, _)| !common.has(s.output)))
+    }
 }
 
 /// The noise of the outputs: the model of each, a force that several have in common, and what they share.
@@ -170,29 +176,29 @@ impl Whitener {
 
     /// As [`Whitener::apply`], into a buffer of the same length.
     pub fn apply_into(&self, layout: &Layout, stack: &[f64], out: &mut [f64]) {
-        let Parts { alone, common, shared } = self.parts(layout);
-        for (run, s) in alone {
+        let parts = self.parts(layout);
+        for (run, s) in parts.alone(layout) {
             self.models[s.output].whiten(run, &stack[s.rows.clone()], &mut out[s.rows.clone()]);
         }
-        if let Some((common, runs)) = common {
-            common.whiten(&runs, stack, out);
+        if let Some((common, runs)) = &parts.common {
+            common.whiten(runs, stack, out);
         }
-        if let Some(shared) = shared {
+        if let Some(shared) = parts.shared {
             shared.take_out(layout, out);
         }
     }
 
     /// The transpose of [`Whitener::apply`], in place.
     pub fn transpose(&self, layout: &Layout, stack: &mut [f64]) {
-        let Parts { alone, common, shared } = self.parts(layout);
-        if let Some(shared) = shared {
+        let parts = self.parts(layout);
+        if let Some(shared) = parts.shared {
             shared.transpose(layout, stack);
         }
-        for (run, s) in alone {
+        for (run, s) in parts.alone(layout) {
             self.models[s.output].transpose(run, &mut stack[s.rows.clone()]);
         }
-        if let Some((common, runs)) = common {
-            common.transpose(&runs, stack);
+        if let Some((common, runs)) = &parts.common {
+            common.transpose(runs, stack);
         }
     }
 
@@ -202,15 +208,14 @@ impl Whitener {
         Self { models, common: None, shared: self.shared.clone() }
     }
 
-    /// By what the series of a layout are whitened.
+    /// What whitens a layout beside the models of its outputs.
     fn parts<'a>(&'a self, layout: &'a Layout) -> Parts<'a> {
         let with =
             |(common, shared): &'a (CommonForce, Option<Shared>)| Some((common, common.runs(layout)?, shared.as_ref()));
-        let Some((common, runs, shared)) = self.common.as_ref().and_then(with) else {
-            return Parts { alone: layout.runs().collect(), common: None, shared: self.shared.as_ref() };
-        };
-        let alone = layout.runs().filter(|(_, s)| !common.has(s.output)).collect();
-        Parts { alone, common: Some((common, runs)), shared }
+        match self.common.as_ref().and_then(with) {
+            Some((common, runs, shared)) => Parts { common: Some((common, runs)), shared },
+            None => Parts { common: None, shared: self.shared.as_ref() },
+        }
     }
 
     /// The state in whose derivative a force enters that several outputs have in common.
@@ -220,32 +225,42 @@ impl Whitener {
 
     /// Colours unit white noise in place: the inverse of [`Whitener::apply`].
     pub fn colour(&self, layout: &Layout, stack: &mut [f64]) {
-        let Parts { alone, common, shared } = self.parts(layout);
-        if let Some(shared) = shared {
+        let parts = self.parts(layout);
+        if let Some(shared) = parts.shared {
             shared.put_in(layout, stack);
         }
-        for (run, s) in alone {
+        for (run, s) in parts.alone(layout) {
             self.models[s.output].colour(run, &mut stack[s.rows.clone()]);
         }
-        if let Some((common, runs)) = common {
-            common.colour(&runs, stack);
+        if let Some((common, runs)) = &parts.common {
+            common.colour(runs, stack);
         }
     }
 
     /// Sum over rows of the logarithm of the innovation's standard deviation: the determinant's share of a log likelihood.
     pub fn log_scale(&self, layout: &Layout) -> f64 {
-        layout.runs().map(|(run, s)| self.log_scale_of(layout, run, s)).sum()
+        let parts = self.parts(layout);
+        layout.runs().map(|(run, s)| self.log_scale_within(&parts, layout, run, s)).sum()
     }
 
     /// The share that a series, after its place among those of its output, has in [`Whitener::log_scale`].
     pub fn log_scale_of(&self, layout: &Layout, run: usize, s: &Series) -> f64 {
-        let Parts { common, shared, .. } = self.parts(layout);
-        let shared = shared.map_or(0.0, |shared| shared.log_scale(layout, s));
-        let common = common.and_then(|(common, runs)| {
+        self.log_scale_within(&self.parts(layout), layout, run, s)
+    }
+
+    fn log_scale_within(&self, parts: &Parts<'_>, layout: &Layout, run: usize, s: &Series) -> f64 {
+        let shared = parts.shared.map_or(0.0, |shared| shared.log_scale(layout, s));
+        let common = parts.common.as_ref().and_then(|(common, runs)| {
             let run = runs.iter().position(|run| common.has(s.output) && run.contains(&s))?;
             Some(common.log_scale(run, s))
         });
         common.unwrap_or_else(|| self.models[s.output].log_scale(run, s.rows.len())) + s.rows.len() as f64 * shared
+    }
+
+    /// Log likelihood of a stacked residual, up to a constant of the layout, less the price of each coefficient.
+    pub fn log_likelihood(&self, layout: &Layout, residual: &[f64]) -> f64 {
+        let white = self.apply(layout, residual);
+        -0.5 * norm2(&white) - self.log_scale(layout) - layout.price() * self.coefficients() as f64
     }
 
     /// Number of coefficients beyond the scales.

@@ -150,12 +150,7 @@ pub fn fit_simulation<'d>(
 
 /// Log likelihood of a residual under a noise model, up to a constant of the data set.
 pub fn log_likelihood(data: &DataSet, noise: &Whitener, residual: &[f64]) -> f64 {
-    let white = noise.apply(&data.layout, residual);
-    -0.5 * norm2(&white) - noise.log_scale(&data.layout) - 0.5 * noise.coefficients() as f64 * rows(data).ln()
-}
-
-fn rows(data: &DataSet) -> f64 {
-    data.rows().max(2) as f64
+    noise.log_likelihood(&data.layout, residual)
 }
 
 /// What [`log_likelihood`] would be more with a price of one for each coefficient of the noise model.
@@ -164,7 +159,7 @@ fn rows(data: &DataSet) -> f64 {
 /// have an effect win by the coefficients that it spares: noise of any colour is likely beforehand. Nor by those that it has besides: what is
 /// more than `none`, the noise of the simulation as it is, has no cheaper price.
 pub fn spared(data: &DataSet, noise: &Whitener, none: &Whitener) -> f64 {
-    noise.coefficients().min(none.coefficients()) as f64 * (0.5 * rows(data).ln() - 1.0).max(0.0)
+    noise.coefficients().min(none.coefficients()) as f64 * (data.layout.price() - 1.0).max(0.0)
 }
 
 /// A noise whose innovations are a smaller share of it than this is no noise: something moves the output slowly and smoothly.

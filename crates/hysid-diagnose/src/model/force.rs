@@ -53,13 +53,22 @@ pub fn noise_of(model: &Model<'_>, theta: &[f64], residual: &[f64], pushed: &[St
         let made = || along.as_ref()?.course(model, paths[output][way].entry(), output).map(Arc::new);
         asked.entry((output, way)).or_insert_with(made).clone()
     };
-    let together = |entry: usize| match along.as_ref() {
-        Some(along) => along.common(model, entry),
-        None => ways.common(model, entry),
+    let together: RefCell<Vec<Arc<CommonPath>>> = RefCell::default();
+    let several = |entry: usize| {
+        if layout.outputs < 2 {
+            return None;
+        }
+        let made = match along.as_ref() {
+            Some(along) => along.common(model, entry),
+            None => ways.common(model, entry),
+        };
+        let path = Arc::new(made?);
+        together.borrow_mut().push(Arc::clone(&path));
+        Some(path)
     };
-    let several = |entry: usize| if layout.outputs > 1 { together(entry) } else { None };
     let noise = layout.fit_noise_along(residual, MAX_AR, &paths, course, several);
-    let common = noise.common_from().and_then(together).into_iter().collect();
+    let mut common = together.into_inner();
+    common.retain(|path| noise.common_from() == Some(path.entry()));
     let asked = asked.into_inner();
     // A course takes as much memory as a few tangents: that of the noise itself is kept.
     let kept = |output: usize, (way, path): (usize, ForcePath)| {

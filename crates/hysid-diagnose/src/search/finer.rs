@@ -261,7 +261,7 @@ mod tests {
         let law = winding.law_at(&there, Purpose::Refit);
         let own = [Some(9.0), Some(8.0)];
         assert_eq!(inherited((winding, &law), &own, &effect, &values), [Some(0.0), Some(0.02)]);
-        // A delay is contained in none.
+        // The lag of a sensor does not contain that of an actuator.
         let other = mechanism("sensor_lag").unwrap();
         assert_eq!(inherited((other, &law), &own, &effect, &values), [Some(0.0), Some(8.0)]);
     }

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
-use super::finer::finer;
+use super::finer::{finer, inherited};
 use super::finish::{finish, likelier};
 use super::given_up::HOPELESS;
 use super::screen::with_added_starts;
@@ -52,16 +52,15 @@ pub fn refit_wider<'d>(
     let values = special.base.values();
     let effect = special.effects.last()?;
     let start = starts(wider).into_iter().next()?;
-    let found = |name: &str| values.parameters.get(name).copied();
-    let shape = |name: &str| {
-        let place = wider.refit.shapes.iter().position(|s| s.name == name)?;
-        found(&effect.written.shapes.get(place)?.name)
-    };
-    let amplitude = |name: &str| wider.refit.amplitudes.iter().any(|a| a.name == name).then_some(0.0);
+    let names = wider.refit.parameters_of();
+    let own: Vec<Option<f64>> =
+        names.iter().map(|name| start.iter().find(|(n, _)| n == name).map(|(_, x)| *x)).collect();
+    let law = wider.mechanism.law_at(&wider.slot, wider.refit.purpose);
     let mut from = with_added_starts(&values, &wider.refit, &wider.slot, setting.data.stretches.len());
-    for (name, x) in start {
-        let x = found(&name).or_else(|| shape(&name)).or_else(|| amplitude(&name)).unwrap_or(x);
-        set(&mut from, &wider.refit.simulation, &name, x);
+    for (name, x) in names.iter().zip(inherited((wider.mechanism, &law), &own, effect, &values)) {
+        if let Some(x) = x {
+            set(&mut from, &wider.refit.simulation, name, x);
+        }
     }
     refit_from(setting, parent, wider, &[from])
 }

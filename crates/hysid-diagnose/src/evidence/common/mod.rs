@@ -10,7 +10,7 @@
 use std::sync::Arc;
 
 use super::below::Below;
-use super::driven::fit::{MEMORY, search};
+use super::driven::fit::{likeliest_pole, search};
 use super::driven::{Driven, differenced, first_scale, remembered, transpose_differenced};
 use super::layout::{Layout, Series};
 use super::noise::NoiseModel;
@@ -118,24 +118,19 @@ impl Problem<'_> {
     /// The likeliest memory of one sensor's noise, where it pays `price`.
     fn remembering(&self, best: (Guess, Outcome), output: usize, price: f64) -> (Guess, Outcome) {
         let own = best.0.sensors[output];
-        let at = |memory: f64| {
-            let pole = 1.0 - 10f64.powf(-memory);
-            if pole <= 0.0 {
-                return None;
-            }
+        let at = |pole: f64| {
             let mut guess = best.0.clone();
             // As large as before.
             guess.sensors[output] = Sensor { pole, sigma: own.sigma * first_scale(pole) / first_scale(own.pole) };
             let found = self.of(&guess).and_then(|outcome| self.rescaled(&guess, &outcome))?;
             Some((found.1.likelihood, found))
         };
-        let start = -(1.0 - if own.pole > 0.0 { own.pole } else { FIRST_POLE }).log10();
-        let least = best.1.likelihood + if own.pole > 0.0 { 0.0 } else { price };
+        let (start, price) = if own.pole > 0.0 { (own.pole, 0.0) } else { (FIRST_POLE, price) };
         if own.pole == 0.0 && at(start).is_none_or(|(likelihood, _)| likelihood < best.1.likelihood) {
             return best;
         }
-        let found = search((start, MEMORY), at).filter(|(_, likelihood, _)| *likelihood > least);
-        found.map_or(best, |(_, _, found)| found)
+        let found = likeliest_pole(start, at).filter(|(likelihood, _)| *likelihood > best.1.likelihood + price);
+        found.map_or(best, |(_, found)| found)
     }
 }
 

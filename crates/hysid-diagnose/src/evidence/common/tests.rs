@@ -121,7 +121,7 @@ fn the_sizes_come_back_and_what_is_whitened_is_independent() {
     let layout = layout(3, n);
     let each = vec![vec![outputs[0].clone()], Vec::new(), vec![outputs[1].clone()]];
     let apart = layout.fit_noise(&stack, 16, &ForcePaths { each: each.clone(), common: Vec::new() });
-    let joint = layout.fit_noise(&stack, 16, &ForcePaths { each, common: vec![path] });
+    let joint = layout.fit_noise(&stack, 16, &ForcePaths { each, common: vec![Arc::new(path)] });
     assert_eq!((apart.common_from(), joint.common_from()), (None, Some(ENTRY)));
     let common = CommonForce::fit(&steady(n), &layout, &stack, &joint.models, 4.0).unwrap();
     let [first, second] = common.sensors[..] else { panic!("two sensors") };

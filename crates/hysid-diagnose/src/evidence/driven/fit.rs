@@ -13,7 +13,7 @@ const POLES: [f64; 4] = [0.5, 0.75, 0.88, 0.94];
 /// Decades between the first guesses of the share of the force, and where the search ends.
 const DECADES: (f64, f64) = (1.0, 0.25);
 /// The same between guesses of the memory of the sensor's noise.
-pub(in crate::evidence) const MEMORY: f64 = 0.3;
+const MEMORY: f64 = 0.3;
 /// Log likelihood by which a force may trail another model before its colour, or its course, is not asked for.
 const HOPELESS: f64 = 150.0;
 /// Log likelihood that the way from row to row gains at the share by the mean one or a tenth of it, before it is looked into.
@@ -196,15 +196,11 @@ impl<'a> Way<'a> {
 
     /// The best memory of the sensor's noise from one on.
     fn memory(&self, from: &Found) -> Option<Found> {
-        let at = |memory: f64| {
-            let sensor = 1.0 - 10f64.powf(-memory);
-            if sensor <= 0.0 {
-                return None;
-            }
+        let at = |sensor: f64| {
             let found = self.share(Colours { sensor, ..from.colours }, (from.decade, 0.5 * DECADES.0))?;
             Some((found.likelihood, found))
         };
-        search((-(1.0 - from.colours.sensor).log10(), MEMORY), at).map(|(_, _, found)| found)
+        likeliest_pole(from.colours.sensor, at).map(|(_, found)| found)
     }
 
     /// What was found as a noise.
@@ -226,6 +222,15 @@ impl<'a> Way<'a> {
 fn unit(path: &ForcePath, pole: f64, rows: usize) -> Option<f64> {
     let unit = path.variance(pole, rows.min(SCALE_ROWS));
     (unit > 0.0 && unit.is_finite()).then_some(unit)
+}
+
+/// The pole of a noise at which a log likelihood is highest, from a first one on by decades of the memory `1/(1 - pole)`: the likelihood there, with what comes with it.
+pub(in crate::evidence) fn likeliest_pole<T>(start: f64, at: impl Fn(f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
+    let of_memory = |decade: f64| {
+        let pole = 1.0 - 10f64.powf(-decade);
+        if pole > 0.0 { at(pole) } else { None }
+    };
+    search((-(1.0 - start).log10(), MEMORY), of_memory).map(|(_, likelihood, with)| (likelihood, with))
 }
 
 /// The decade at which a log likelihood is highest, from a first one on by steps that shrink; `at` gives it with what comes with it.

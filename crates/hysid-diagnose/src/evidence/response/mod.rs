@@ -87,7 +87,7 @@ pub struct ForcePaths {
     /// To each output by itself.
     pub each: Vec<Vec<ForcePath>>,
     /// To several of them at once.
-    pub common: Vec<CommonPath>,
+    pub common: Vec<Arc<CommonPath>>,
 }
 
 /// Inner product of a few numbers.
