@@ -50,19 +50,23 @@ pub struct Site {
     pub turning: Vec<[Symbol; 2]>,
     /// The rates of inputs that are places: what a length changes that someone else pays out has forces of that rate in it (a load on a rope that is hoisted).
     pub led: Vec<Symbol>,
+    /// What a sensor may show a share of past what it measures.
+    pub passed: Vec<Symbol>,
 }
 
 impl Site {
     /// A site at which nothing else is looked at than what is there.
     fn alone(place: Place, slot: String, side: &'static str, own: Vec<Symbol>) -> Self {
-        let (others, parts, turning, led) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { place, slot, side, own, rate: None, others, parts, acceleration: None, turning, led }
+        let (rate, acceleration, others, led, passed) = (None, None, Vec::new(), Vec::new(), Vec::new());
+        let (parts, turning) = (Vec::new(), Vec::new());
+        Self { place, slot, side, own, rate, others, parts, acceleration, turning, led, passed }
     }
 
     /// All that terms are written over, in this order.
     pub fn symbols(&self) -> impl Iterator<Item = &Symbol> {
         let turning = self.turning.iter().flatten();
-        self.own.iter().chain(&self.rate).chain(&self.others).chain(&self.acceleration).chain(turning).chain(&self.led)
+        let plant = self.own.iter().chain(&self.rate).chain(&self.others).chain(&self.acceleration);
+        plant.chain(turning).chain(&self.led).chain(&self.passed)
     }
 
     /// What [`Self::others`] are among [`Self::symbols`].
@@ -77,10 +81,16 @@ impl Site {
         (0..self.turning.len()).map(move |i| [start + 2 * i, start + 2 * i + 1])
     }
 
-    /// What [`Self::led`] are among [`Self::symbols`]: the last.
+    /// What [`Self::led`] are among [`Self::symbols`].
     pub fn led_at(&self) -> Range<usize> {
-        let end = self.symbols().count();
+        let end = self.passed_at().start;
         end - self.led.len()..end
+    }
+
+    /// What [`Self::passed`] are among [`Self::symbols`]: the last.
+    pub fn passed_at(&self) -> Range<usize> {
+        let end = self.symbols().count();
+        end - self.passed.len()..end
     }
 }
 
@@ -107,10 +117,27 @@ pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
         let shown = |(_, o): (usize, &Output)| Symbol::new(&o.column, o.expression.clone());
         let elsewhere =
             simulation.outputs.iter().enumerate().filter(|(j, o)| *j != i && o.expression != output.expression);
-        let others = if simulation.is_static() { Vec::new() } else { elsewhere.take(OTHERS).map(shown).collect() };
-        Site { others, ..Site::alone(Place::Output(i), format!("output:{}", output.column), side, own) }
+        let (others, passed) = if simulation.is_static() {
+            Default::default()
+        } else {
+            (elsewhere.take(OTHERS).map(shown).collect(), passed(simulation, i))
+        };
+        Site { others, passed, ..Site::alone(Place::Output(i), format!("output:{}", output.column), side, own) }
     });
     states.chain(inputs.filter(|site| has_slot(&site.slot))).chain(outputs).collect()
+}
+
+/// What goes into the machine, and what moves inside it, that neither this output nor another shows: a sensor may show a share of it (the resistance in series
+/// with a capacitor, a current that is picked up).
+fn passed(simulation: &Simulation, output: usize) -> Vec<Symbol> {
+    let own = &simulation.outputs[output].expression;
+    let shown = |name: &str| {
+        let is_it = |o: &Output| matches!(&o.expression, Expr::Symbol(s) if s == name);
+        own.uses(name) || simulation.outputs.iter().any(is_it)
+    };
+    let states = simulation.states.iter().map(|s| s.name.as_str()).filter(|name| !is_turn(simulation, name));
+    let inputs = simulation.inputs.iter().map(|u| u.symbol.as_str());
+    inputs.chain(states).filter(|name| !shown(name)).take(OTHERS).map(Symbol::itself).collect()
 }
 
 /// The equation of a state. In one that has no slot, as a part of a cascade, only the rate may be limited.

@@ -124,6 +124,7 @@ pub fn terms(base: &Base<'_>) -> Vec<Term> {
                 found.extend(shapes::linked((x, named(v)), other, named(others.end)));
             }
         }
+        found.extend(site.passed_at().map(|i| shapes::proportional(named(i))));
         for rate in site.led_at() {
             found.extend((0..own).map(|i| shapes::product(named(rate), named(i))));
         }

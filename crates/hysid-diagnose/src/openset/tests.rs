@@ -68,16 +68,22 @@ fn what_moves_elsewhere_is_seen() {
 }
 
 #[test]
-fn what_a_sensor_shows_of_another_is_seen() {
-    let found = missing_in(|truth| {
-        let mixed = Expr::parse("s + 0.02*th").unwrap();
-        truth.output_mut("stretch_m").unwrap().expression = mixed;
-    });
-    let OpenSet { record, gain, .. } = found.unwrap();
-    let first = &record.terms[0];
-    let told = (record.slot.as_str(), first.term.as_str(), record.signature.side.as_str());
-    assert_eq!(told, ("output:stretch_m", "swing_rad", "output"), "{:?}", record.terms);
-    assert!((first.coefficient / 0.02 - 1.0).abs() < 0.05 && gain > 50.0, "{first:?} {gain}");
+fn what_a_sensor_shows_of_what_it_does_not_measure_is_seen() {
+    // Of another sensor, of the input, and of a state that no sensor shows.
+    for (output, measured, passed, share) in
+        [("stretch_m", "s", "swing_rad", 0.02), ("swing_rad", "th", "a", 0.01), ("stretch_m", "s", "w", 0.01)]
+    {
+        let shown = if passed == "swing_rad" { "th" } else { passed };
+        let found = missing_in(|truth| {
+            let mixed = Expr::parse(&format!("{measured} + {share}*{shown}")).unwrap();
+            truth.output_mut(output).unwrap().expression = mixed;
+        });
+        let OpenSet { record, gain, .. } = found.unwrap();
+        let first = &record.terms[0];
+        let told = (record.slot.as_str(), first.term.as_str(), record.signature.side.as_str());
+        assert_eq!(told, (format!("output:{output}").as_str(), passed, "output"), "{:?}", record.terms);
+        assert!((first.coefficient / share - 1.0).abs() < 0.05 && gain > 50.0, "{first:?} {gain}");
+    }
 }
 
 /// What is said to be missing in a simulation, where a state of the truth has another derivative and the one output a noise of this share.
