@@ -310,9 +310,7 @@ fn written<'d>(
 ) -> Written<'d> {
     let (search, pool) = (&found.search, &found.pool);
     let (winner, vetoed) = (judged.winner, judged.veto.is_some());
-    // What a search had no time for generic terms find: that is no sign of an imitation.
-    let unfinished = search.setting.budget.unfinished();
-    let foreign = judged.rest.foreign && !unfinished;
+    let foreign = judged.rest.imitation;
     let risk = if winner > 0 && !vetoed { gamble(&search.setting, &judged.contest(pool)) } else { None };
     let may_be_written = |i| Judgement::may_be_written(found, i);
     // Where the catalogue does not hold what is missing, no other set of it is written either.
@@ -369,7 +367,7 @@ fn written<'d>(
         "on the recorded inputs mirrored, reversed in time or doubled the sparse correction leads far from the simulation as it is, or runs away: it is told, and not written"
     } else if judged.rest.spectrum {
         "several relaxations stand beside each other: a memory with many time scales (a fractional element, a spectrum of relaxation times), which the catalogue does not have; within the band of the recording their sum follows it"
-    } else if judged.rest.foreign && unfinished {
+    } else if judged.rest.foreign && !foreign {
         "generic terms explain far more than the effects that were fitted in time: more is missing than these"
     } else if foreign && !vetoed {
         "the best set of effects imitates something that the catalogue does not have: generic terms explain far more; no augmented simulation is written, since an imitation may be worse than nothing on another input"

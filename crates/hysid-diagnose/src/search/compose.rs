@@ -40,6 +40,8 @@ pub struct Ask<'a, 'd> {
     pub plainly: &'a dyn Fn(&Hypothesis<'d>) -> Option<(Hypothesis<'d>, Vec<Candidate>)>,
     /// Whether an unknown force on the machine explains what sets of more effects add to one that stands.
     pub pushed: &'a dyn Fn(&Hypothesis<'d>, &[Hypothesis<'d>]) -> bool,
+    /// Whether generic terms explain so much more than a set that no further effect makes up for it.
+    pub outdone: &'a dyn Fn(&Hypothesis<'d>) -> bool,
     /// Whether pairs of what could be missing in the simulation without effects were fitted before.
     pub paired: bool,
 }
@@ -95,6 +97,9 @@ pub fn compose<'d>(
         // Where nothing significant is left there is nothing to add but what the noise model holds.
         let Some(standing) = best_below(pool, depth).filter(|&b| pool[b].effects.len() + 1 >= depth) else { break };
         let more = unexplained(&pool[standing]);
+        if more && (ask.outdone)(&pool[standing]) {
+            return;
+        }
         let best = pool[standing].log_evidence;
         let parents = beam(pool, depth - 1, options.beam);
         let mut found = if depth == 2 { parted(setting, none, pool, candidates) } else { Vec::new() };
@@ -153,7 +158,7 @@ pub fn compose<'d>(
     for _ in 0..ROUNDS {
         let Some(best) = best_of(pool) else { return };
         let n = pool[best].effects.len();
-        if n < 2 || setting.budget.omits(Step::Drops) {
+        if n < 2 || setting.budget.omits(Step::Drops) || (ask.outdone)(&pool[best]) {
             return;
         }
         let (before, evidence) = (pool[best].key(), pool[best].log_evidence);

@@ -17,6 +17,7 @@ pub mod given_up;
 pub mod joint;
 pub mod looks;
 pub mod numerics_check;
+pub mod outdone;
 pub mod parted;
 pub mod peaks;
 pub mod prediction;
@@ -45,6 +46,7 @@ use crate::evidence::{
 use crate::mechanism::{Family, Mechanism, SLOW};
 use crate::model::base::Base;
 use crate::model::hypothesis::{Hypothesis, Key, Setting};
+use crate::openset::needed::Refitted;
 use crate::openset::{ODDS_AGAINST_MORE, OpenSet, correction};
 use crate::request::{Hooks, Options, Question};
 use crate::slot::Slot;
@@ -85,6 +87,8 @@ pub struct Search<'a, 'd> {
     screened: Mutex<Option<(Key, Vec<Candidate>)>>,
     /// Generic terms, by statement: the second look, composition, the verdict and the correction ask for the same ones.
     open: Mutex<BTreeMap<Key, Option<OpenSet>>>,
+    /// Those of the simulation without effects as they were refitted: composition asks whether they outdo what it has reached, the verdict tells them.
+    corrected: Mutex<Option<(Key, Refitted<'d>)>>,
 }
 
 impl Setting<'_> {
@@ -98,8 +102,9 @@ impl Setting<'_> {
 impl<'a, 'd> Search<'a, 'd> {
     /// A search that has found nothing yet.
     pub fn new(setting: Setting<'d>, options: Options, hooks: &'a Hooks<'a>) -> Self {
-        let (tests, screened, open) = (Mutex::default(), Mutex::default(), Mutex::default());
-        Self { setting, options, hooks, tests, screened, open }
+        let (tests, screened, open, corrected) =
+            (Mutex::default(), Mutex::default(), Mutex::default(), Mutex::default());
+        Self { setting, options, hooks, tests, screened, open, corrected }
     }
 
     /// The simulation without effects under this search's noise model, and what could be missing in it.
@@ -169,11 +174,8 @@ impl<'a, 'd> Search<'a, 'd> {
         settled: usize,
     ) {
         (self.hooks.progress)("looking for a second and third effect");
-        let unexplained = |h: &Hypothesis<'_>| {
-            let test = self.remains(h);
-            let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured();
-            seen || self.open(h).is_some_and(|o| o.by_chance(ODDS_AGAINST_MORE) < self.options.alpha)
-        };
+        let unexplained = |h: &Hypothesis<'d>| self.is_unexplained(h);
+        let outdone = |h: &Hypothesis<'d>| self.is_outdone(none, h);
         let bounds = SearchOptions { first: settled.max(1) + 1, depth: 3, beam: 2, most: 6 };
         let count = candidates.len();
         let around = |h: &Hypothesis<'d>, columns| self.around(h, columns);
@@ -190,6 +192,7 @@ impl<'a, 'd> Search<'a, 'd> {
             absorbed: &absorbed,
             plainly: &plainly,
             pushed: &pushed,
+            outdone: &outdone,
             paired,
         };
         compose(&self.setting, none, candidates, pool, bounds, &hear);
@@ -238,6 +241,13 @@ impl<'a, 'd> Search<'a, 'd> {
         let found = if self.leaves_nothing(h) { None } else { correction(&h.base, self.setting.noise) };
         held(&self.open).insert(key, found.clone());
         found
+    }
+
+    /// Whether something significant is left of a hypothesis' residual.
+    fn is_unexplained(&self, h: &Hypothesis<'_>) -> bool {
+        let test = self.remains(h);
+        let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured();
+        seen || self.open(h).is_some_and(|o| o.by_chance(ODDS_AGAINST_MORE) < self.options.alpha)
     }
 
     /// The test of what remains of a hypothesis' residual.

@@ -188,7 +188,7 @@ mod tests {
 
     /// Asks about an axis in a position loop that sticks at each turn, integrated by hand, under forces of this size (rms, over its friction) which
     /// nobody recorded, with a cogging of this size.
-    fn axis<T>(forces: f64, cogging: f64, ask: impl FnOnce(&Search<'_, '_>, &Hypothesis<'_>) -> T) -> T {
+    fn axis<T>(forces: f64, cogging: f64, ask: impl for<'d> FnOnce(&Search<'_, 'd>, &Hypothesis<'d>) -> T) -> T {
         let text = "[time]\nperiod_s = 0.01\n[inputs]\nr = \"ref_m\"\n[parameters]\nm = { value = 5.0, min = 1.0, max = 16.0, unit = \"kg\" }\n\
                     c = { value = 30.0, min = 9.0, max = 90.0, unit = \"N s/m\" }\nFc = { value = 8.0, min = 2.0, max = 30.0, unit = \"N\" }\n[states]\n\
                     x = { derivative = \"v\", initial = 0.0, unit = \"m\" }\n\

@@ -13,6 +13,7 @@ use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Key, best_place, block_score};
 use crate::openset::uneven::{Uneven, uneven};
 use crate::search::candidate::Candidate;
+use crate::search::compose::best_of;
 use crate::search::explore::Explored;
 use crate::search::rounding::Converter;
 
@@ -67,6 +68,13 @@ impl<'d> Judgement<'d> {
         let Explored { search, pool, candidates, significant, shown, p_value, least, .. } = found;
         let (setting, significant) = (&search.setting, *significant);
         let unfinished = || setting.budget.unfinished();
+        // The blocks would take what is left of the time.
+        if unfinished()
+            && significant
+            && let Some(best) = best_of(pool)
+        {
+            search.is_outdone(&pool[0], &pool[best]);
+        }
         let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
         let mut blocks = block_scores(setting, pool);
         // Under a noise of its own a simulation may leave more than it has to.
@@ -137,7 +145,11 @@ impl<'d> Judgement<'d> {
             within = VerdictKind::Ambiguous;
             support.iter_mut().for_each(Support::weaken);
         }
-        let mut kind = if outside && !unfinished() && !runs_away { VerdictKind::NotInCatalogue } else { within };
+        let mut kind = if outside && (rest.imitation || !unfinished()) && !runs_away {
+            VerdictKind::NotInCatalogue
+        } else {
+            within
+        };
         // What is significant stays so, though no set outweighs its price: the likeliest is told, neither believed nor written. The level is shared by surrogates
         // and sets, so that what only the surrogates see must be below half of it.
         let mut told = if runs_away { 0 } else { winner };

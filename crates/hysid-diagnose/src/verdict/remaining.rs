@@ -14,6 +14,7 @@ use crate::openset::needed::{Refitted, likelier};
 use crate::openset::{ODDS_AGAINST, ODDS_AGAINST_MORE, OpenSet, Writable};
 use crate::search::Search;
 use crate::search::given_up::leaves_more;
+use crate::search::outdone::may_imitate;
 
 /// A correction is believed where the whitened error on blocks that it was not fitted to falls below this share.
 const BETTER: f64 = 0.97;
@@ -24,10 +25,6 @@ const BY_CHANCE: f64 = 0.05;
 /// On cases of development seed 3 with a law of the catalogue generic terms added nothing (log evidence -8 to 1), and alone they trailed by 4 or more.
 const AS_MUCH: f64 = 0.5;
 const FAR_MORE: f64 = 5.0;
-/// Share of what the simulation as it is leaves, noise and all, below which a set is no imitation, whatever generic terms add: of a recording that is a
-/// thousand times louder than its noise no law takes all (Silverbox: a cubic spring and a quadratic one leave a twentieth, in which terms find half as
-/// much evidence again).
-const HARDLY_ANY: f64 = 0.1;
 /// Share of a set's evidence from which generic terms, on the tangent, are worth a fit in its place. Where the mismatch is large the tangent shows but a
 /// part of what a term explains once it stands in the equations.
 const WORTH_A_FIT: f64 = 0.25;
@@ -49,8 +46,10 @@ pub struct Remaining<'d> {
     tried: Option<Refitted<'d>>,
     /// What is written into the simulation, as it was refitted.
     written: Option<CorrectionRecord>,
-    /// Whether generic terms explain so much that the set is an imitation.
+    /// Whether generic terms explain so much more than the set that something is missing in it.
     pub foreign: bool,
+    /// Whether that makes an imitation of it: what a search had no time for generic terms find, too, but not so much.
+    pub imitation: bool,
     /// Whether the set is a sum of relaxations, which stands for a memory with many time scales.
     pub spectrum: bool,
     /// Whether something significant is left.
@@ -79,7 +78,7 @@ impl<'d> Remaining<'d> {
         let seen = open.as_ref().filter(|o| told(o));
         let explained = best.log_evidence - none.log_evidence;
         let spectrum = is_a_spectrum(best);
-        let imitates = winner > 0 && best.base.unexplained() > HARDLY_ANY.powi(2) * none.base.unexplained();
+        let imitates = winner > 0 && may_imitate(none, best);
         let generic = if imitates || spectrum { search.open(none) } else { None };
         // That a further resonance has the frequency and the damping of one that the simulation has would be a coincidence.
         let lead = || {
@@ -96,11 +95,26 @@ impl<'d> Remaining<'d> {
             if doubtful && !outdone { in_place(search, none, best, seen, generic.as_ref()) } else { (None, None) };
         let outdone = outdone || swapped.is_some();
         let foreign = imitates && (outdone || seen.is_some_and(|o| o.gain > AS_MUCH * explained));
+        let in_time = || !budget.unfinished() || search.is_outdone(none, best);
+        let imitation = foreign && in_time();
         let imperfect = winner > 0 && (foreign || spectrum || left);
         // What is told of an imitation is what it imitates, where that is more than what it leaves.
         let both = explained + open.as_ref().map_or(0.0, |o| o.gain);
         let instead = generic.filter(|g| spectrum || (outdone && swapped.is_none() && g.gain > both));
-        Self { test, open, instead, swapped, tried, written: None, foreign, spectrum, imperfect, pushed, alpha }
+        Self {
+            test,
+            open,
+            instead,
+            swapped,
+            tried,
+            written: None,
+            foreign,
+            imitation,
+            spectrum,
+            imperfect,
+            pushed,
+            alpha,
+        }
     }
 
     /// Whether what is left is of unequal size in a way that matters: evidence counts its samples alike.
@@ -151,7 +165,7 @@ impl<'d> Remaining<'d> {
                 let left = self.open.as_ref().filter(|_| trusted);
                 let on_top = left.and_then(|o| likelier(setting, &pool[winner], o, f64::NEG_INFINITY));
                 let generic = if winner > 0 { search.open(&pool[0]) } else { None };
-                let alone = || likelier(setting, &pool[0], generic.as_ref()?, f64::NEG_INFINITY);
+                let alone = || search.corrected(&pool[0], generic.as_ref()?, f64::NEG_INFINITY);
                 let instead = self.tried.take().or_else(alone);
                 let both = on_top.map(|r| (r, true)).into_iter().chain(instead.map(|r| (r, false)));
                 both.max_by(|(a, _), (b, _)| a.hypothesis.log_evidence.total_cmp(&b.hypothesis.log_evidence))?
@@ -231,9 +245,9 @@ fn in_place<'d>(
     let halfway = none.log_evidence + HALFWAY * explained;
     let likely =
         |o: &&OpenSet| o.gain > WORTH_A_FIT * explained && o.gains_by_chance(ODDS_AGAINST_MORE) < search.options.alpha;
-    let refitted = |o: &OpenSet| {
-        if search.setting.budget.omits(Step::Imitation) { None } else { likelier(&search.setting, none, o, halfway) }
-    };
+    let late = || search.setting.budget.omits(Step::Imitation);
+    let refitted = |o: &OpenSet| if late() { None } else { likelier(&search.setting, none, o, halfway) };
+    let alone = |o: &OpenSet| if late() { None } else { search.corrected(none, o, halfway) };
     // A parameter that varies beside the set is written into the set's simulation.
     let beside = |o: &OpenSet| match o.writable.as_ref()? {
         Writable::Sparse(terms) => {
@@ -243,7 +257,7 @@ fn in_place<'d>(
         Writable::Varying(_) => None,
     };
     let lead = |r: &Refitted<'d>| r.hypothesis.log_evidence - best.log_evidence - r.of.choice;
-    let (beside, alone) = (seen.and_then(beside), generic.filter(likely).and_then(refitted));
+    let (beside, alone) = (seen.and_then(beside), generic.filter(likely).and_then(alone));
     let leads = |swapped: &Option<Refitted<'d>>| swapped.as_ref().map(lead).filter(|l| *l > FAR_MORE);
     match (leads(&beside), leads(&alone)) {
         // One that was left halfway is no correction yet.
