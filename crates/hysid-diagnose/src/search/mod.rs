@@ -174,7 +174,8 @@ impl<'a, 'd> Search<'a, 'd> {
         settled: usize,
     ) {
         (self.hooks.progress)("looking for a second and third effect");
-        let unexplained = |h: &Hypothesis<'d>| self.is_unexplained(h);
+        // What a coloured noise has taken no test shows.
+        let unexplained = |h: &Hypothesis<'d>| self.is_unexplained(h) || h.base.coloured();
         let outdone = |h: &Hypothesis<'d>| self.is_outdone(none, h);
         let bounds = SearchOptions { first: settled.max(1) + 1, depth: 3, beam: 2, most: 6 };
         let count = candidates.len();
@@ -246,7 +247,7 @@ impl<'a, 'd> Search<'a, 'd> {
     /// Whether something significant is left of a hypothesis' residual.
     fn is_unexplained(&self, h: &Hypothesis<'_>) -> bool {
         let test = self.remains(h);
-        let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE || h.base.coloured();
+        let seen = test.p_value < STOP_LEVEL || test.statistic > STOP_SCORE;
         seen || self.open(h).is_some_and(|o| o.by_chance(ODDS_AGAINST_MORE) < self.options.alpha)
     }
 
