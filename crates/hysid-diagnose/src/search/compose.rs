@@ -12,6 +12,7 @@ use super::looks::{Looks, Seen};
 use super::parted::parted;
 use super::rivals::{include, rivals_of, short_list};
 use super::simpler::simplify;
+use super::turned::turned;
 use crate::budget::Step;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 
@@ -132,6 +133,7 @@ pub fn compose<'d>(
         if found.is_empty() {
             break;
         }
+        found.extend(turned(setting, none, &found, pool));
         let reached = found.iter().map(|h| h.log_evidence).fold(f64::NEG_INFINITY, f64::max);
         // What moves the machine at random is in its free run, where further effects take some of it, one after the other. Two that are there take more of it together
         // than a force can.

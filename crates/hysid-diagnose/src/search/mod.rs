@@ -33,6 +33,7 @@ pub mod shaken;
 pub mod simpler;
 pub mod starts;
 pub mod tracked;
+pub mod turned;
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
