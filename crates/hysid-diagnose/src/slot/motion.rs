@@ -69,6 +69,8 @@ pub(super) struct Motion<'a> {
     pub derivative: &'a Expr,
     /// What the rate of the displacement is for each unit of the velocity where that is not one: `1000` from m/s to mm, `1/m` from a momentum.
     pub scale: Option<Expr>,
+    /// Whether it is a flow, whose mass moves in a pipe between stores.
+    pub flow: bool,
 }
 
 impl Motion<'_> {
@@ -187,6 +189,17 @@ pub(super) fn is_momentum(simulation: &Simulation, state: &State) -> bool {
     divided > 0 && otherwise == divided
 }
 
+/// Units of flows.
+const FLOWS: &[&str] = &["m^3/s", "kg/s"];
+
+/// Whether a state is the flow in a pipe, of which the mass moves: a level or a pressure that it fills drives it back. What only follows, as the flow of a valve
+/// that opens slowly, has no mass.
+fn is_inert_flow(simulation: &Simulation, state: &State) -> bool {
+    let acts_back =
+        |s: &State| s.name != state.name && s.derivative.uses(&state.name) && state.derivative.uses(&s.name);
+    has_unit(simulation.unit_of(&state.name), FLOWS) && simulation.states.iter().any(acts_back)
+}
+
 pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> Vec<Motion<'a>> {
     let of_the_user = |s: &&State| original.state(&s.name).is_some();
     let (turns, others): (Vec<&State>, Vec<&State>) =
@@ -204,7 +217,8 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
         let unit = shown_unit(simulation, &velocity.name);
         let alone =
             kinematic(unit.as_ref(), &velocity.name) == Kinematic::Velocity || is_momentum(simulation, velocity);
-        if passes_on || !(position.is_some() || alone) {
+        let flow = position.is_none() && !alone && is_inert_flow(simulation, velocity);
+        if passes_on || !(position.is_some() || alone || flow) {
             continue;
         }
         // A chain x' = v, v' = a, a' = ...: what acts on a depends on where and how fast the part is; v is no displacement.
@@ -219,6 +233,7 @@ pub(super) fn motions<'a>(simulation: &'a Simulation, original: &Simulation) -> 
             state: &velocity.name,
             derivative: &velocity.derivative,
             scale,
+            flow,
         });
     }
     found
@@ -248,6 +263,23 @@ mod tests {
         assert!(found("-", "w*s", "u - s/50").is_empty(), "a sum of what a lag shows");
         assert!(found("-", "w*(s - y)", "u - s/50 - y").is_empty(), "a second lag");
         assert!(found("mol/l", "w*s", "u - s/50 - y").is_empty());
+    }
+
+    #[test]
+    fn a_flow_has_mass_where_what_it_fills_drives_it_back() {
+        let found = |flow: &str, level: &str| {
+            let text = format!(
+                "[time]\nperiod_s = 0.5\n[inputs]\nq = \"turbine_m3_s\"\n[parameters]\nr = {{ value = 0.2, min = 0.01 }}\n[states]\n\
+                 Q = {{ derivative = \"{flow}\", initial = 0.0, unit = \"L/s\" }}\nz = {{ derivative = \"{level}\", initial = 0.0, unit = \"m\" }}\n[outputs]\nlevel_m = \"z\"\n"
+            );
+            let simulation = Simulation::parse(&text, "surge.sim.toml").unwrap();
+            let slots = crate::slot::Structure::of(&simulation).slots;
+            let at = |label: &str| slots.iter().find(|s| s.label == label).map(|s| s.place);
+            (at("state:Q"), at("state:z"))
+        };
+        use crate::slot::Place::{Force, Store};
+        assert_eq!(found("0.1*(38 - z - r*Q)", "(Q - q)/33"), (Some(Force), Some(Store)));
+        assert_eq!(found("(q - Q)/r", "(Q - r*z)/33").0, Some(Store), "it follows a valve");
     }
 
     #[test]

@@ -77,7 +77,9 @@ impl Finder<'_> {
         self.held(Place::Store, |name| {
             let has = |units: &[&str]| has_unit(self.simulation.unit_of(name), units);
             let charged = || self.motions.iter().any(|m| m.x == Some(name)) && has(CHARGED);
-            self.motions.is_empty() || (!self.moves(name) && has(&["Pa", "K", "m^3"])) || charged()
+            // What flows moves between stores of any kind.
+            let only_flows = self.motions.iter().all(|m| m.flow);
+            !self.moves(name) && (only_flows || has(&["Pa", "K", "m^3"])) || charged()
         })
     }
 
