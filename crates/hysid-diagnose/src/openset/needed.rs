@@ -55,7 +55,8 @@ pub fn likelier<'d>(
         let share = if matches!(rival.writable, Some(Writable::Varying(_))) { RIVAL.0 } else { RIVAL.1 };
         rival.gain > share * open.gain
     };
-    let all = std::iter::once(open).chain(open.rivals.iter().filter(likely));
+    let rivals = open.rivals.iter().filter(likely).take_while(|_| !setting.budget.omits(Step::Terms));
+    let all = std::iter::once(open).chain(rivals);
     let lead = |r: &Refitted<'d>| r.hypothesis.log_evidence - r.of.choice;
     all.filter_map(|o| fitted(setting, parent, o, least)).max_by(|a, b| lead(a).total_cmp(&lead(b)))
 }

@@ -68,13 +68,9 @@ impl<'d> Judgement<'d> {
         let Explored { search, pool, candidates, significant, shown, p_value, least, .. } = found;
         let (setting, significant) = (&search.setting, *significant);
         let unfinished = || setting.budget.unfinished();
-        // The blocks would take what is left of the time.
-        if unfinished()
-            && significant
-            && let Some(best) = best_of(pool)
-        {
-            search.is_outdone(&pool[0], &pool[best]);
-        }
+        // Before the blocks take what is left of the time.
+        let outdone =
+            unfinished() && significant && best_of(pool).is_some_and(|best| search.is_outdone(&pool[0], &pool[best]));
         let weighed: Vec<Weighed> = pool.iter().map(weigh).collect();
         let mut blocks = block_scores(setting, pool);
         // Under a noise of its own a simulation may leave more than it has to.
@@ -129,7 +125,7 @@ impl<'d> Judgement<'d> {
             support.iter_mut().for_each(Support::weaken);
         }
         // A mismatch that is significant stays one, though nothing that was fitted in time explains it.
-        let cut_short = significant && winner == 0 && unfinished();
+        let cut_short = significant && winner == 0 && unfinished() && !outdone;
         let mut within = if cut_short { VerdictKind::Ambiguous } else { verdict_of(&support) };
         let elsewhere = uneven.iter().flatten().any(|u| u.probability >= FIRM)
             || wandering.iter().flatten().any(|w| w.is_sure(search.options.alpha));
@@ -145,7 +141,7 @@ impl<'d> Judgement<'d> {
             within = VerdictKind::Ambiguous;
             support.iter_mut().for_each(Support::weaken);
         }
-        let mut kind = if outside && (rest.imitation || !unfinished()) && !runs_away {
+        let mut kind = if outside && (outdone || rest.imitation || !unfinished()) && !runs_away {
             VerdictKind::NotInCatalogue
         } else {
             within
