@@ -24,8 +24,8 @@ pub fn may_imitate(none: &Hypothesis<'_>, set: &Hypothesis<'_>) -> bool {
 }
 
 impl<'d> Search<'_, 'd> {
-    /// Whether generic terms in the equations of the simulation without effects explain far more than the best set, and either leave nothing or still more; `false` where there is no
-    /// time left to see.
+    /// Whether generic terms in the equations of the simulation without effects explain far more than the best set and leave nothing, or explain still more;
+    /// `false` where there is no time left to see.
     pub fn is_outdone(&self, none: &Hypothesis<'d>, best: &Hypothesis<'d>) -> bool {
         let explained = best.log_evidence - none.log_evidence;
         let share = if best.effects.len() > 1 { SEVERAL } else { SINGLE };
@@ -60,6 +60,8 @@ impl<'d> Search<'_, 'd> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
     use hysid_plant::Simulation;
 
     use super::*;
@@ -78,17 +80,17 @@ mod tests {
         y.iter_mut().for_each(|y| *y += noise * random());
         let original = Simulation::parse(BASELINE, "test.sim.toml").unwrap();
         let data = recorded(&original, PERIOD, [("u_N", u), ("x_m", y)]);
-        let late = std::sync::atomic::AtomicBool::new(false);
-        let expired = |_: f64| late.load(std::sync::atomic::Ordering::Relaxed);
+        let late = AtomicBool::new(false);
+        let expired = |_: f64| late.load(Ordering::Relaxed);
         let budget = Budget::new(&expired);
         let (setting, none) = calibrated(original, &data, NoiseKind::White(1.0), &budget);
         effects.map(|id| {
             let search = || Search::new(setting.clone(), Options::default(), &Hooks::SILENT);
-            late.store(false, std::sync::atomic::Ordering::Relaxed);
+            late.store(false, Ordering::Relaxed);
             let asked = search();
             let set = asked.answer(&none, &vec![(id.to_owned(), "state:v".to_owned())]).unwrap();
             let in_time = asked.is_outdone(&none, &set);
-            late.store(true, std::sync::atomic::Ordering::Relaxed);
+            late.store(true, Ordering::Relaxed);
             // What was refitted in time is known.
             assert_eq!(asked.is_outdone(&none, &set), in_time, "{id}");
             (in_time, search().is_outdone(&none, &set))

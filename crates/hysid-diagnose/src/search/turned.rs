@@ -18,7 +18,7 @@ const NEAR: f64 = 50.0;
 /// Iterations that tell who is hopeless.
 const SKETCH: usize = 5;
 
-/// Whether a signal meets two effects one after the other, and answers the one order as the other: linear laws do, and an offset is one behind a curve too.
+/// Whether a signal meets two effects one after the other, and the one order is not as the other: it is where both laws are linear.
 fn stand_in_a_row(a: &Effect, b: &Effect) -> bool {
     let path = [Place::Input, Place::Prescribed, Place::Between, Place::Command, Place::Sensor];
     let linear = |e: &Effect| {
