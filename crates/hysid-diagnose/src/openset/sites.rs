@@ -127,6 +127,11 @@ pub fn sites(simulation: &Simulation, structure: &Structure) -> Vec<Site> {
     states.chain(inputs.filter(|site| has_slot(&site.slot))).chain(outputs).collect()
 }
 
+/// The states, but for angles that nothing uses.
+fn used_states(simulation: &Simulation) -> impl Iterator<Item = &str> {
+    simulation.states.iter().map(|s| s.name.as_str()).filter(|name| !is_turn(simulation, name))
+}
+
 /// What goes into the machine, and what moves inside it, that neither this output nor another shows: a sensor may show a share of it (the resistance in series
 /// with a capacitor, a current that is picked up).
 fn passed(simulation: &Simulation, output: usize) -> Vec<Symbol> {
@@ -135,9 +140,8 @@ fn passed(simulation: &Simulation, output: usize) -> Vec<Symbol> {
         let is_it = |o: &Output| matches!(&o.expression, Expr::Symbol(s) if s == name);
         own.uses(name) || simulation.outputs.iter().any(is_it)
     };
-    let states = simulation.states.iter().map(|s| s.name.as_str()).filter(|name| !is_turn(simulation, name));
     let inputs = simulation.inputs.iter().map(|u| u.symbol.as_str());
-    inputs.chain(states).filter(|name| !shown(name)).take(OTHERS).map(Symbol::itself).collect()
+    inputs.chain(used_states(simulation)).filter(|name| !shown(name)).take(OTHERS).map(Symbol::itself).collect()
 }
 
 /// The equation of a state. In one that has no slot, as a part of a cascade, only the rate may be limited.
@@ -210,8 +214,7 @@ fn turning(structure: &Structure, own: &[Symbol]) -> Vec<[Symbol; 2]> {
 /// pull), and in proportion where the simulation has no parameter for it (two axes that a spinning wheel couples).
 fn others(simulation: &Simulation, own: &[Symbol]) -> Vec<Symbol> {
     let known: Vec<String> = own.iter().flat_map(|s| s.meaning.symbols()).collect();
-    let states = simulation.states.iter().map(|s| s.name.as_str()).filter(|name| !is_turn(simulation, name));
-    states.filter(|name| known.iter().all(|k| k != name)).take(OTHERS).map(Symbol::itself).collect()
+    used_states(simulation).filter(|name| known.iter().all(|k| k != name)).take(OTHERS).map(Symbol::itself).collect()
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::candidate::Candidate;
 use super::finish::{finish, likelier};
+use super::given_up::HOPELESS;
 use super::screen::{rewrite_at, with_added_starts};
 use super::starts::{set, starts, weakened};
 use crate::evidence::Whitener;
@@ -12,6 +13,9 @@ use crate::model::Values;
 use crate::model::base::Base;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
 use crate::slot::Slot;
+
+/// Iterations of [`assemble`] that tell who is hopeless.
+pub const SKETCH: usize = 5;
 
 /// An effect to be written: the mechanism, the slot, values of its parameters in the order of the law.
 pub struct Part {
@@ -97,6 +101,17 @@ pub fn complete<'d>(setting: &Setting<'d>, mut h: Hypothesis<'d>) -> Hypothesis<
     }
     finish(setting, &mut h, 0);
     h
+}
+
+/// The likeliest of some sketches of a set, fitted to the end unless it trails what it stands `beside` hopelessly.
+pub fn carried_on<'d>(
+    setting: &Setting<'d>,
+    sketches: impl IntoIterator<Item = Hypothesis<'d>>,
+    beside: &Hypothesis<'_>,
+) -> Option<Hypothesis<'d>> {
+    let h = sketches.into_iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+    let near = h.log_evidence > beside.log_evidence - HOPELESS;
+    Some(if near { complete(setting, h) } else { h })
 }
 
 /// Squared amplitude of a member, over its variance, up to which the others are moved to where they come without it.

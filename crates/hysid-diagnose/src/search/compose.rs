@@ -2,11 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::assemble::{Part, assemble, complete, without};
+use super::assemble::{Part, SKETCH, assemble, carried_on, without};
 use super::candidate::{Candidate, Columns};
 use super::finer::{finer, inherited};
 use super::fitting::{refit_all, refit_beside};
-use super::given_up::HOPELESS;
 use super::joint::{fitted_pairs, likeliest_pairs, superposed};
 use super::looks::{Looks, Seen};
 use super::parted::parted;
@@ -272,7 +271,7 @@ fn swapped<'d>(
         let amplitudes = rival.points.first().map_or(&[][..], |p| &p.amplitudes);
         let mut parts: Vec<Part> = set.effects.iter().map(|e| Part::of_effect(e, &values)).collect();
         parts[index] = Part::of_candidate(rival, 0, amplitudes);
-        let begun = |parts: &[Part]| assemble(setting, none, &values, parts, &set.base.whitener, 5);
+        let begun = |parts: &[Part]| assemble(setting, none, &values, parts, &set.base.whitener, SKETCH);
         let own = begun(&parts);
         // A relative begins where the member stands, too, and so does a law that contains the member's: it follows the recording no worse.
         let member = &set.effects[index];
@@ -284,9 +283,7 @@ fn swapped<'d>(
             parts[index].values = inherited((rival.mechanism, &law), &parts[index].values, member, &values);
             begun(&parts)
         });
-        let h = own.into_iter().chain(heir.flatten()).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-        let near = h.log_evidence > set.log_evidence - HOPELESS;
-        Some(if near { complete(setting, h) } else { h })
+        carried_on(setting, own.into_iter().chain(heir.flatten()), set)
     });
     sketched.collect()
 }

@@ -35,11 +35,11 @@ impl<'d> Search<'_, 'd> {
             return false;
         }
         let Some(open) = self.open(none).filter(told) else { return false };
-        let refitted = || likelier(&self.setting, none, &open, f64::NEG_INFINITY);
-        let late = || self.setting.budget.omits(Step::Imitation);
-        let Some(found) = self.known_correction(none).or_else(|| if late() { None } else { refitted() }) else {
-            return false;
+        let refitted = || {
+            let late = self.setting.budget.omits(Step::Imitation);
+            if late { None } else { likelier(&self.setting, none, &open, f64::NEG_INFINITY) }
         };
+        let Some(found) = self.known_correction(none).or_else(refitted) else { return false };
         let gain = found.hypothesis.log_evidence - none.log_evidence - found.of.choice;
         let whole = || beyond(share, gain) && !self.is_unexplained(&found.hypothesis);
         let outdone = beyond(IN_PART * share, gain) || whole();

@@ -5,10 +5,9 @@
 
 use rayon::prelude::*;
 
-use super::assemble::{Part, assemble, complete};
+use super::assemble::{Part, SKETCH, assemble, carried_on};
 use super::candidate::Candidate;
 use super::compose::best_of_size;
-use super::given_up::HOPELESS;
 use crate::budget::Step;
 use crate::mechanism::{Block, Family};
 use crate::model::hypothesis::{Hypothesis, Setting};
@@ -16,8 +15,6 @@ use crate::model::hypothesis::{Hypothesis, Setting};
 /// Relatives and offsets that are paired.
 const RELATIVES: usize = 5;
 const OFFSETS: usize = 2;
-/// Iterations that tell who is hopeless.
-const SKETCH: usize = 5;
 
 /// Pairs in the place of the best single effect of a pool where that is the sum of two others; none where it is not.
 pub fn parted<'d>(
@@ -48,9 +45,7 @@ pub fn parted<'d>(
             return None;
         }
         let parts = pair.map(|c| Part::of_candidate(c, 0, c.points.first().map_or(&[][..], |p| &p.amplitudes)));
-        let h = assemble(setting, none, &own, &parts, &best.base.whitener, SKETCH)?;
-        let near = h.log_evidence > best.log_evidence - HOPELESS;
-        Some(if near { complete(setting, h) } else { h })
+        carried_on(setting, assemble(setting, none, &own, &parts, &best.base.whitener, SKETCH), best)
     });
     fitted.collect()
 }

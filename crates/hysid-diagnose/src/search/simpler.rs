@@ -5,18 +5,15 @@
 
 use rayon::prelude::*;
 
-use super::assemble::{Part, assemble, complete};
+use super::assemble::{Part, SKETCH, assemble, carried_on};
 use super::compose::add;
 use super::finer::inherited;
-use super::given_up::HOPELESS;
 use crate::budget::Step;
 use crate::mechanism::{Mechanism, Purpose, mechanism};
 use crate::model::hypothesis::{Hypothesis, Setting};
 
 /// Log evidence by which a set may trail the best and still have its members' special cases tried, and how many such sets there are at most.
 const NEAR: (f64, usize) = (6.0, 6);
-/// Iterations of a first fit.
-const SKETCH: usize = 5;
 
 /// Adds the sets near the best with one member as the special case of its law, as far as nobody fitted them yet.
 pub fn simplify<'d>(setting: &Setting<'d>, none: &Hypothesis<'d>, pool: &mut Vec<Hypothesis<'d>>) {
@@ -70,8 +67,7 @@ fn simpler<'d>(
         values: inherited((special, &law), &vec![None; law.parameters.len()], effect, &values),
         ..Part::of_effect(effect, &values)
     };
-    let h = assemble(setting, none, &values, &parts, &set.base.whitener, SKETCH)?;
-    Some(if h.log_evidence > set.log_evidence - HOPELESS { complete(setting, h) } else { h })
+    carried_on(setting, assemble(setting, none, &values, &parts, &set.base.whitener, SKETCH), set)
 }
 
 #[cfg(test)]

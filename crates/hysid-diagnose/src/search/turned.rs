@@ -5,8 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::assemble::{Part, assemble, complete};
-use super::given_up::HOPELESS;
+use super::assemble::{Part, SKETCH, assemble, carried_on};
 use crate::budget::Step;
 use crate::mechanism::Family;
 use crate::model::hypothesis::{Effect, Hypothesis, Setting};
@@ -15,8 +14,6 @@ use crate::slot::Place;
 /// Sets that are turned, and what they may trail the best of them by (log evidence).
 const MOST: usize = 4;
 const NEAR: f64 = 50.0;
-/// Iterations that tell who is hopeless.
-const SKETCH: usize = 5;
 
 /// Whether a signal meets two effects one after the other, and the one order is not as the other: it is where both laws are linear.
 fn stand_in_a_row(a: &Effect, b: &Effect) -> bool {
@@ -49,21 +46,18 @@ pub fn turned<'d>(
             return None;
         }
         let values = set.base.values();
-        let last = set.effects.last()?;
+        let (last, others) = set.effects.split_last()?;
         let alone = pool
             .iter()
             .find(|h| matches!(&h.effects[..], [e] if e.mechanism.id == last.mechanism.id && e.slot.is_at(&last.slot)));
         let begun = |first: Part| {
-            let mut parts: Vec<Part> = set.effects.iter().map(|e| Part::of_effect(e, &values)).collect();
-            parts.pop();
+            let mut parts: Vec<Part> = others.iter().map(|e| Part::of_effect(e, &values)).collect();
             parts.insert(before, first);
             assemble(setting, none, &values, &parts, &set.base.whitener, SKETCH)
         };
         let there = begun(Part::of_effect(last, &values));
         let alone = alone.and_then(|h| begun(Part::of_effect(&h.effects[0], &h.base.values())));
-        let h = there.into_iter().chain(alone).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-        let near = h.log_evidence > set.log_evidence - HOPELESS;
-        Some(if near { complete(setting, h) } else { h })
+        carried_on(setting, there.into_iter().chain(alone), set)
     };
     sets.into_par_iter().filter_map(turn).collect()
 }
