@@ -88,18 +88,25 @@ impl Problem<'_> {
         Some((next, outcome))
     }
 
-    /// The likeliest sizes from a guess on.
-    fn sized(&self, guess: Guess) -> Option<(Guess, Outcome)> {
-        let outcome = self.of(&guess)?;
-        let mut best = (guess, outcome);
+    /// The sensors' noises of the highest likelihood beside a force of this size, or nearly so.
+    fn balanced(&self, mut best: (Guess, Outcome)) -> (Guess, Outcome) {
         for _ in 0..ROUNDS.0 {
             let before = best.1.likelihood;
-            for _ in 0..ROUNDS.0 {
-                match self.rescaled(&best.0, &best.1) {
-                    Some(next) if next.1.likelihood > best.1.likelihood => best = next,
-                    _ => break,
-                }
+            match self.rescaled(&best.0, &best.1) {
+                Some(next) if next.1.likelihood > before => best = next,
+                _ => break,
             }
+            if best.1.likelihood < before + ROUNDS.1 {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The likeliest sizes from balanced ones on.
+    fn sized(&self, mut best: (Guess, Outcome)) -> (Guess, Outcome) {
+        for _ in 0..ROUNDS.0 {
+            let before = best.1.likelihood;
             let at = |decade: f64| {
                 let guess = Guess { variance: best.0.variance * 10f64.powf(decade), ..best.0.clone() };
                 let outcome = self.of(&guess)?;
@@ -111,8 +118,9 @@ impl Problem<'_> {
             if best.1.likelihood < before + ROUNDS.1 {
                 break;
             }
+            best = self.balanced(best);
         }
-        Some(best)
+        best
     }
 
     /// The likeliest memory of one sensor's noise, where it pays `price`.
@@ -156,20 +164,25 @@ impl CommonForce {
             Some(driven) => Sensor { sigma: driven.sigma, pole: driven.colours.sensor },
             None => Sensor { sigma: models[o].innovation(), pole },
         };
-        let sized = |driven: &Driven, pole: f64| {
+        let start = |driven: &Driven, pole: f64| {
             let sensors: Vec<Sensor> = outputs.iter().map(|o| sensor(o, pole)).collect();
             let variance = driven.share * driven.sigma * driven.sigma;
             let possible = sensors.iter().all(|s| s.sigma > 0.0);
-            possible.then(|| problem.sized(Guess { variance, pole: driven.colours.force, sensors })).flatten()
+            let guess = possible.then_some(Guess { variance, pole: driven.colours.force, sensors })?;
+            let outcome = problem.of(&guess)?;
+            Some(problem.balanced((guess, outcome)))
         };
         let poles: &[f64] = if outputs.iter().all(|&o| own(o).is_some()) { &[0.0] } else { &[0.0, FIRST_POLE] };
-        let (mut guess, mut outcome) = (outputs.iter().filter_map(|&o| own(o)))
-            .flat_map(|driven| poles.iter().filter_map(|&pole| sized(driven, pole)))
+        // Balanced, the force of one output tells already whether that of another is nearer.
+        let likeliest = (outputs.iter().filter_map(|&o| own(o)))
+            .flat_map(|driven| poles.iter().filter_map(|&pole| start(driven, pole)))
             .max_by(|a, b| a.1.likelihood.total_cmp(&b.1.likelihood))?;
+        let (mut guess, mut outcome) = problem.sized(likeliest);
         for _ in 0..ROUNDS.0 {
             let before = outcome.likelihood;
             let remembering = |best, output| problem.remembering(best, output, price);
-            (guess, outcome) = problem.sized((0..outputs.len()).fold((guess, outcome), remembering).0)?;
+            let remembered = (0..outputs.len()).fold((guess, outcome), remembering);
+            (guess, outcome) = problem.sized(problem.balanced(remembered));
             if outcome.likelihood < before + ROUNDS.1 {
                 break;
             }

@@ -9,8 +9,9 @@
 use std::sync::Arc;
 
 use super::course::Rows;
-use super::moving::Moved;
-use super::{Colours, Course, ForcePath, between};
+use super::gains::Row;
+use super::moving::{Chain, Innovations, Moved, MovingFilter, innovations};
+use super::{Course, ForcePath, between, pushed};
 
 /// The noise of one output's sensor: standard deviation of its innovations, and the pole of a first-order autoregression (0 where it is white).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,51 +83,107 @@ impl CommonPath {
 
     /// The outputs one after the other, each in units of its sensor's innovations and less what the sensor's noise before tells of it; the force with a memory of
     /// this pole (0: white).
-    pub(in crate::evidence) fn interleaved(&self, sensors: &[Sensor], pole: f64) -> Moved {
-        let (n, outputs) = (self.states, self.outputs.len());
-        let force = Colours { force: pole, sensor: 0.0 };
-        let remembered = (pole != 0.0).then_some(n);
-        let known = n + usize::from(pole != 0.0);
-        // A sensor whose noise has a memory remembers what it showed last without that noise.
-        let shown: Vec<usize> = (0..outputs).filter(|&o| sensors[o].pole != 0.0).collect();
-        let states = known + shown.len();
-        let mut row = Vec::new();
-        let mut moment = |moment: &[f64], values: &mut Vec<f64>| {
-            let (a, rest) = moment.split_at(n * n);
-            let (b, shows) = rest.split_at(n);
-            for (o, c) in shows.chunks_exact(n).enumerate() {
-                row.clear();
-                force.extend((a, b, c), &mut row);
-                let (a, rest) = row.split_at(known * known);
-                let b = &rest[..known];
-                let start = values.len();
-                values.resize(start + Course::width(states), 0.0);
-                let (matrix, rest) = values[start..].split_at_mut(states * states);
-                let (pushed, output) = rest.split_at_mut(states);
-                if o + 1 < outputs {
-                    (0..states).for_each(|i| matrix[i * states + i] = 1.0);
-                } else {
-                    for (to, a) in matrix.chunks_exact_mut(states).zip(a.chunks_exact(known)) {
-                        to[..known].copy_from_slice(a);
-                    }
-                    for (at, &of) in shown.iter().enumerate() {
-                        let to = &mut matrix[(known + at) * states..][..n];
-                        to.iter_mut().zip(&shows[of * n..][..n]).for_each(|(to, c)| *to = c / sensors[of].sigma);
-                    }
-                    pushed[..known].copy_from_slice(b);
-                }
-                output.iter_mut().zip(c).for_each(|(to, c)| *to = c / sensors[o].sigma);
-                if let Some(at) = shown.iter().position(|&of| of == o) {
-                    output[known + at] = -sensors[o].pole;
+    pub(in crate::evidence) fn interleaved<'a>(&'a self, sensors: &'a [Sensor], pole: f64) -> Interleaved<'a> {
+        let shown: Vec<usize> = (0..self.outputs.len()).filter(|&o| sensors[o].pole != 0.0).collect();
+        let known = self.states + usize::from(pole != 0.0);
+        Interleaved { path: self, sensors, pole, states: known + shown.len(), shown }
+    }
+}
+
+/// A common way with noises of some sizes and colours, as rows of one output each. They are made where they are asked for: many sizes are tried.
+pub(in crate::evidence) struct Interleaved<'a> {
+    path: &'a CommonPath,
+    sensors: &'a [Sensor],
+    pole: f64,
+    /// Those of the path, that of a force with a memory, and one of each sensor whose noise has a memory: what it showed last without that noise.
+    states: usize,
+    /// The sensors whose noise has a memory.
+    shown: Vec<usize>,
+}
+
+impl Interleaved<'_> {
+    /// Puts output `o` of a moment into a row (matrix, force, output), zero before but for the same entries of another moment. Matrix and force are those of its last
+    /// row, after which the states move on.
+    fn put_output(&self, moment: &[f64], o: usize, [matrix, force, output]: [&mut [f64]; 3]) {
+        let (n, states) = (self.path.states, self.states);
+        let (a, rest) = moment.split_at(n * n);
+        let (b, shows) = rest.split_at(n);
+        let first = states - self.shown.len();
+        let scaled = |of: usize, to: &mut [f64]| {
+            to.iter_mut().zip(&shows[of * n..][..n]).for_each(|(to, c)| *to = c / self.sensors[of].sigma);
+        };
+        if self.moves(o) {
+            pushed(self.pole, (a, b), matrix, force);
+            self.shown.iter().enumerate().for_each(|(at, &of)| scaled(of, &mut matrix[(first + at) * states..][..n]));
+        }
+        scaled(o, &mut output[..n]);
+        if let Some(at) = self.shown.iter().position(|&of| of == o) {
+            output[first + at] = -self.sensors[o].pole;
+        }
+    }
+
+    /// Whether the states move on after this output.
+    fn moves(&self, o: usize) -> bool {
+        o + 1 == self.path.outputs.len()
+    }
+
+    /// [`Innovations`] of stretches under a force of this variance.
+    pub(in crate::evidence) fn innovations(&self, variance: f64, stretches: &[Vec<f64>]) -> Option<Innovations> {
+        innovations(self, variance, stretches)
+    }
+
+    /// The filter for a force of this variance.
+    pub(in crate::evidence) fn filter(&self, variance: f64) -> Option<MovingFilter> {
+        let (n, outputs) = (self.states, self.path.outputs.len());
+        let run = |run: &Rows| {
+            let moments = run.values.len() / self.path.width();
+            let mut values = vec![0.0; moments * outputs * Course::width(n)];
+            let rows = values.chunks_exact_mut(Course::width(n));
+            let each = run.values.chunks_exact(self.path.width()).flat_map(|m| (0..outputs).map(move |o| (m, o)));
+            for (row, (moment, o)) in rows.zip(each) {
+                let (matrix, rest) = row.split_at_mut(n * n);
+                let (force, output) = rest.split_at_mut(n);
+                self.put_output(moment, o, [&mut *matrix, force, output]);
+                if !self.moves(o) {
+                    (0..n).for_each(|i| matrix[i * n + i] = 1.0);
                 }
             }
-        };
-        let longer = |run: &Rows| {
-            let mut values = Vec::with_capacity(run.values.len() / self.width() * outputs * Course::width(states));
-            run.values.chunks_exact(self.width()).for_each(|one| moment(one, &mut values));
             Rows { values, count: run.count * outputs }
         };
-        let runs = self.runs.iter().map(longer).collect();
-        Moved(Arc::new(Course { states, remembered, together: outputs, runs }))
+        let runs = self.path.runs.iter().map(run).collect();
+        Moved(Arc::new(Course { states: n, remembered: self.remembered(), together: outputs, runs })).filter(variance)
+    }
+}
+
+impl Chain for Interleaved<'_> {
+    fn states(&self) -> usize {
+        self.states
+    }
+
+    fn together(&self) -> usize {
+        self.path.outputs.len()
+    }
+
+    fn remembered(&self) -> Option<usize> {
+        (self.pole != 0.0).then_some(self.path.states)
+    }
+
+    fn recur(&self, run: usize) -> Option<usize> {
+        let run = &self.path.runs[run];
+        let stored = run.values.len() / self.path.width();
+        (stored < run.count).then_some(stored * self.path.outputs.len())
+    }
+
+    fn rows(&self, run: usize) -> usize {
+        self.path.runs[run].count * self.path.outputs.len()
+    }
+
+    fn put<const N: usize>(&self, run: usize, k: usize, row: &mut Row<N>) {
+        let (run, width, outputs) = (&self.path.runs[run], self.path.width(), self.path.outputs.len());
+        let stored = (run.values.len() / width).max(1);
+        row.moves = self.moves(k % outputs);
+        row.c = [0.0; N];
+        let moment = &run.values[k / outputs % stored * width..][..width];
+        self.put_output(moment, k % outputs, [row.a.as_flattened_mut(), &mut row.b, &mut row.c]);
     }
 }

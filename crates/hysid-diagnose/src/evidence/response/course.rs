@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::Colours;
-use super::gains::{Gaining, Row};
+use super::gains::Row;
+use super::moving::Chain;
 
 /// A run of rows: each of its own, or a few that recur.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,30 +39,21 @@ impl Course {
         states * (states + 2)
     }
 
-    /// Rows of a run.
-    pub(super) fn rows(&self, run: usize) -> usize {
-        self.runs.get(run).map_or(0, |rows| rows.count)
+    /// Matrix, force and output of a row of a run.
+    fn step(&self, run: usize, k: usize) -> (&[f64], &[f64], &[f64]) {
+        let (n, width, values) = (self.states, Self::width(self.states), &self.runs[run].values);
+        let stored = (values.len() / width).max(1);
+        let (a, rest) = values[k % stored * width..][..width].split_at(n * n);
+        let (b, c) = rest.split_at(n);
+        (a, b, c)
     }
 
-    /// Matrix, force and output of each row of a run.
+    /// The same of each row.
     pub(super) fn steps(
         &self,
         run: usize,
     ) -> impl DoubleEndedIterator<Item = (&[f64], &[f64], &[f64])> + ExactSizeIterator {
-        let (n, width, rows) = (self.states, Self::width(self.states), &self.runs[run]);
-        let stored = (rows.values.len() / width).max(1);
-        (0..rows.count).map(move |k| {
-            let (a, rest) = rows.values[k % stored * width..][..width].split_at(n * n);
-            let (b, c) = rest.split_at(n);
-            (a, b, c)
-        })
-    }
-
-    /// Rows after which those of a run recur; `None` where each is of its own.
-    fn recur(&self, run: usize) -> Option<usize> {
-        let rows = &self.runs[run];
-        let stored = rows.values.len() / Self::width(self.states);
-        (stored < rows.count).then_some(stored)
+        (0..self.rows(run)).map(move |k| self.step(run, k))
     }
 
     /// The same for noises of these colours.
@@ -79,19 +71,38 @@ impl Course {
         let remembered = (colours.force != 0.0).then_some(n);
         Arc::new(Self { states, remembered, together: 1, runs: (0..self.runs.len()).map(longer).collect() })
     }
+}
 
-    /// The rows of a run by arrays.
-    pub(super) fn rows_of<const N: usize>(&self, run: usize) -> impl Iterator<Item = Row<N>> {
-        self.steps(run).enumerate().map(|(k, (a, b, c))| Row {
-            moves: (k + 1) % self.together == 0,
-            a: std::array::from_fn(|i| std::array::from_fn(|j| a[i * N + j])),
-            b: std::array::from_fn(|i| b[i]),
-            c: std::array::from_fn(|i| c[i]),
-        })
+impl Chain for Course {
+    fn states(&self) -> usize {
+        self.states
     }
 
-    /// Powers and gains before the first row of a run, under a force of this variance.
-    pub(super) fn begun<const N: usize>(&self, run: usize, variance: f64) -> Gaining<N> {
-        Gaining::new(variance, self.remembered, self.recur(run))
+    fn together(&self) -> usize {
+        self.together
+    }
+
+    fn remembered(&self) -> Option<usize> {
+        self.remembered
+    }
+
+    fn recur(&self, run: usize) -> Option<usize> {
+        let rows = &self.runs[run];
+        let stored = rows.values.len() / Self::width(self.states);
+        (stored < rows.count).then_some(stored)
+    }
+
+    fn rows(&self, run: usize) -> usize {
+        self.runs.get(run).map_or(0, |rows| rows.count)
+    }
+
+    fn put<const N: usize>(&self, run: usize, k: usize, row: &mut Row<N>) {
+        let (a, b, c) = self.step(run, k);
+        row.moves = (k + 1) % self.together == 0;
+        if row.moves {
+            row.a.as_flattened_mut().copy_from_slice(a);
+            row.b.copy_from_slice(b);
+        }
+        row.c.copy_from_slice(c);
     }
 }

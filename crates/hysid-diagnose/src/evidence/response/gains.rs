@@ -13,6 +13,13 @@ pub(super) struct Row<const N: usize> {
     pub c: [f64; N],
 }
 
+impl<const N: usize> Row<N> {
+    /// Of zeros.
+    pub fn new() -> Self {
+        Self { moves: true, a: [[0.0; N]; N], b: [0.0; N], c: [0.0; N] }
+    }
+}
+
 /// The covariance of the predicted state, for noise of the sensor with unit variance.
 struct Riccati<const N: usize> {
     p: [[f64; N]; N],

@@ -53,19 +53,25 @@ impl Colours {
         rows.resize(row + states * (states + 2), 0.0);
         let (matrix, rest) = rows[row..].split_at_mut(states * states);
         let (force, output) = rest.split_at_mut(states);
-        matrix.chunks_exact_mut(states).zip(a.chunks_exact(n)).for_each(|(to, a)| to[..n].copy_from_slice(a));
-        if self.force == 0.0 {
-            force[..n].copy_from_slice(b);
-        } else {
-            (0..n).for_each(|i| matrix[i * states + n] = b[i]);
-            matrix[n * states + n] = self.force;
-            force[n] = (1.0 - self.force * self.force).sqrt();
-        }
+        pushed(self.force, (a, b), matrix, force);
         output[..n].copy_from_slice(c);
         if self.sensor != 0.0 {
             matrix[(states - 1) * states..][..n].copy_from_slice(c);
             output[states - 1] = -self.sensor;
         }
+    }
+}
+
+/// Puts matrix (by rows) and force of a row into those of as many states or more, zero before, with a force of this pole: one with a memory is the next state.
+fn pushed(pole: f64, (a, b): (&[f64], &[f64]), matrix: &mut [f64], force: &mut [f64]) {
+    let (n, states) = (b.len(), force.len());
+    matrix.chunks_exact_mut(states).zip(a.chunks_exact(n)).for_each(|(to, a)| to[..n].copy_from_slice(a));
+    if pole == 0.0 {
+        force[..n].copy_from_slice(b);
+    } else {
+        (0..n).for_each(|i| matrix[i * states + n] = b[i]);
+        matrix[n * states + n] = pole;
+        force[n] = (1.0 - pole * pole).sqrt();
     }
 }
 

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
 
 use super::course::Course;
+use super::gains::{Gaining, Row};
 use super::{Colours, dot_short as dot};
 use crate::evidence::norm2;
 
@@ -38,17 +39,44 @@ macro_rules! of_size {
 const LARGE: f64 = 1e100;
 
 /// Sums of squares of the scaled innovations of stretches, for each row of a moment, and the sum of the logarithms of their standard deviations.
-type Innovations = (Vec<f64>, f64);
+pub(super) type Innovations = (Vec<f64>, f64);
 
-/// Those of a course.
-fn innovations_of<const N: usize>(course: &Course, variance: f64, stretches: &[Vec<f64>]) -> Option<Innovations> {
-    let (mut squares, mut logs, mut powers) = (vec![0.0; course.together], 0.0, 1.0_f64);
+/// Rows that follow each other, of each run.
+pub(super) trait Chain {
+    /// Number of states.
+    fn states(&self) -> usize;
+    /// Rows of one moment: the states move on after the last of them.
+    fn together(&self) -> usize;
+    /// The state that is a force with a memory, which has its variance from the start.
+    fn remembered(&self) -> Option<usize>;
+    /// Rows after which those of a run recur; `None` where each is of its own.
+    fn recur(&self, run: usize) -> Option<usize>;
+    /// Rows of a run.
+    fn rows(&self, run: usize) -> usize;
+    /// Puts a row of a run, of as many states as there are, in the place of another one. The matrix and the force of a row after which nothing moves are any.
+    fn put<const N: usize>(&self, run: usize, k: usize, row: &mut Row<N>);
+
+    /// Powers and gains before the first row of a run, under a force of this variance.
+    fn begun<const N: usize>(&self, run: usize, variance: f64) -> Gaining<N> {
+        Gaining::new(variance, self.remembered(), self.recur(run))
+    }
+}
+
+/// Those of stretches along a chain, under a force of this variance.
+pub(super) fn innovations(chain: &impl Chain, variance: f64, stretches: &[Vec<f64>]) -> Option<Innovations> {
+    of_size!(chain.states(), innovations_of(chain, variance, stretches))
+}
+
+fn innovations_of<const N: usize>(chain: &impl Chain, variance: f64, stretches: &[Vec<f64>]) -> Option<Innovations> {
+    let together = chain.together();
+    let (mut squares, mut logs, mut powers) = (vec![0.0; together], 0.0, 1.0_f64);
     for (run, e) in stretches.iter().enumerate() {
-        let (mut x, mut gains) = ([0.0; N], course.begun::<N>(run, variance));
-        for (k, (row, e)) in course.rows_of::<N>(run).zip(e).enumerate() {
+        let (mut x, mut gains, mut row) = ([0.0; N], chain.begun::<N>(run, variance), Row::new());
+        for (k, e) in e.iter().enumerate() {
+            chain.put(run, k, &mut row);
             let (power, gain) = gains.next(&row)?;
             let innovation = e - dot(&row.c, &x);
-            squares[k % course.together] += innovation * innovation / power;
+            squares[k % together] += innovation * innovation / power;
             powers *= power;
             if powers > LARGE {
                 logs += powers.ln();
@@ -68,8 +96,9 @@ fn gains_of<const N: usize>(course: &Course, variance: f64) -> Option<Gains> {
     let runs = 0..course.runs.len();
     let (mut sigmas, mut gains) = (vec![Vec::new(); runs.len()], vec![Vec::new(); runs.len()]);
     for run in runs {
-        let mut known = course.begun::<N>(run, variance);
-        for row in course.rows_of::<N>(run) {
+        let (mut known, mut row) = (course.begun::<N>(run, variance), Row::new());
+        for k in 0..course.rows(run) {
+            course.put(run, k, &mut row);
             let (power, gain) = known.next(&row)?;
             sigmas[run].push(power.sqrt());
             gains[run].extend(gain);
@@ -99,7 +128,7 @@ impl Moved {
 
     /// [`Innovations`] of stretches under a force of this variance.
     pub(in crate::evidence) fn innovations(&self, variance: f64, stretches: &[Vec<f64>]) -> Option<Innovations> {
-        of_size!(self.0.states, innovations_of(&self.0, variance, stretches))
+        innovations(&*self.0, variance, stretches)
     }
 
     /// The variance that a force of unit variance gives the output, without what the rows before tell of it, at each row of each run.

@@ -13,6 +13,7 @@ pub mod modulation;
 pub mod written;
 
 use hysid_linalg::dot;
+use rayon::prelude::*;
 
 use super::MOST_TERMS;
 use super::regress::regress;
@@ -28,8 +29,8 @@ use followed::{Signal, Way};
 use likely::{Candidate, likely_lines, likely_to_follow, likely_walks, pairs};
 use modulation::{Modulated, modulated};
 
-/// Rounds of amplitudes and noise by turns.
-const ROUNDS: usize = 3;
+/// Rounds of amplitudes and noise by turns, and the log likelihood below which another one is not worth it.
+const ROUNDS: (usize, f64) = (3, 0.1);
 
 /// What varies, and how.
 #[derive(Debug, Clone)]
@@ -167,7 +168,8 @@ fn all(base: &Base<'_>, kind: NoiseKind, noises: &[Whitener]) -> Option<Vec<Like
         found.extend(likely_lines(base, &view, &machine, &time, symbols.len()));
         found.extend(likely_to_follow(&view, &pairs));
         let among = (symbols.as_slice(), Way::ALL.len() * pairs.len());
-        all.extend(found.into_iter().filter_map(|candidate| judged(base, kind, noise, among, &time, candidate, none)));
+        let judge = |candidate| judged(base, kind, noise, among, &time, candidate, none);
+        all.par_extend(found.into_par_iter().filter_map(judge));
     }
     Some(all)
 }
@@ -194,13 +196,19 @@ fn judged(
         let (_, after) = regress(base, &picked, &left, None, 0.0);
         left = layout.white_noise(&after);
     }
-    for _ in 0..ROUNDS {
+    let mut reached = f64::NEG_INFINITY;
+    for _ in 0..ROUNDS.0 {
         if let Course::Walk(scale) = &mut course {
             let view = View::new(base, &left);
             *scale = Wander::new(&view.of(&columns), &view.r, share).mean_gain().1;
         }
         let (_, after) = regress(base, &picked, &left, None, course.precision(share));
         left = layout.fit_noise(&after, order, &base.paths);
+        let likelihood = left.log_likelihood(layout, &after);
+        if likelihood < reached + ROUNDS.1 {
+            break;
+        }
+        reached = likelihood;
     }
     let (amplitudes, after) = regress(base, &picked, &left, None, course.precision(share));
     let view = View::new(base, &left);
